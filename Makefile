@@ -1,0 +1,52 @@
+# One virtual environment a purpose, each made from nothing but Python 3.11+ and make.
+.DEFAULT_GOAL := help
+.PHONY: help demo test check matrix docs clean
+
+# The first Python 3.11 or newer that really starts; PYTHON=... forces one.
+PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11 python; do \
+	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
+VENV := .venv
+BIN := $(VENV)/bin
+
+help:  ## say what there is
+	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*##/\t/' | expand -t 10
+
+demo: $(VENV)/demo.ready  ## three simulated drives, homed and moved at once, with live positions
+	@$(BIN)/python -m compax_aio.cli.demo
+
+test: $(VENV)/test.ready  ## all tests, with coverage
+	$(BIN)/python -m pytest --cov --cov-report=term
+
+check: $(VENV)/check.ready  ## format, lint, types, import contracts, docs
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/sphinx-build -q -W --keep-going -b html docs docs/_build/html
+
+docs: check  ## the documents, in docs/_build/html
+
+matrix:  ## all tests on every CPython from 3.11 up that this machine has
+	@$(PYTHON) .ci/matrix.py
+
+clean:  ## forget the virtual environments and everything built
+	rm -rf .venv .venv-* build dist docs/_build .coverage .coverage.* .pytest_cache .mypy_cache .ruff_cache .hypothesis
+
+$(VENV)/pip.ready:
+	@test -n "$(PYTHON)" || { echo "compax_aio needs Python 3.11 or newer; set PYTHON=/path/to/python3.11"; exit 1; }
+	@echo "setting up $(VENV) with $$($(PYTHON) --version) (once)"
+	@$(PYTHON) -m venv $(VENV)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade 'pip>=25.1'
+	@touch $@
+
+$(VENV)/demo.ready: $(VENV)/pip.ready pyproject.toml
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[cli]'
+	@touch $@
+
+$(VENV)/test.ready: $(VENV)/demo.ready pyproject.toml
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --group test
+	@touch $@
+
+$(VENV)/check.ready: $(VENV)/test.ready pyproject.toml
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --group check
+	@touch $@

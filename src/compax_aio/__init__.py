@@ -1,0 +1,1 @@
+"""Move servo axes over a serial line or TCP and await the position reached."""

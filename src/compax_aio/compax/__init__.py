@@ -1,0 +1,1 @@
+"""The COMPAX servo drive: its facts, its line, and what a caller holds."""

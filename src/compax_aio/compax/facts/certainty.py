@@ -1,0 +1,15 @@
+"""How well a fact is founded."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+__all__ = ["Certainty"]
+
+
+class Certainty(Enum):
+    """How well a row of a table is founded."""
+
+    DOCUMENTED = "a manual says so"
+    INFERRED = "deduced from what manuals say"
+    PLACEHOLDER = "no source; a value so that something can be sent or simulated"

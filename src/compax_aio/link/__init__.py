@@ -1,0 +1,1 @@
+"""Turns: the asyncio.Protocol that runs any device's line protocol, one exchange at a time."""

@@ -1,0 +1,1 @@
+"""The far end: simulated devices for tests, demonstrations, teaching and work without a machine."""

@@ -1,0 +1,1 @@
+"""Bytes: one opener a URL scheme, each giving a plain asyncio.Transport."""
