@@ -1,0 +1,381 @@
+"""The drive as callers hold it: connect, read, move, stop, close."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Generator, Iterable
+from types import TracebackType
+from typing import Any, Final, Self
+
+from ..errors import ConnectionLostError, InvalidCommandError
+from ..link.cancellation import despite_cancellation
+from ..link.contract import Event, Lane
+from ..link.link import LinkStats
+from ..transports.url import TransportURL
+from .codecs import (
+    DriveStatus,
+    HistoryEntry,
+    StatusValue,
+    decode_error,
+    decode_history,
+    decode_status_value,
+)
+from .events import (
+    ComparatorPassed,
+    ConnectionLost,
+    EventHub,
+    EventStream,
+    Fault,
+    PositionMessage,
+    UnexpectedText,
+)
+from .facts.device_errors import DeviceError
+from .line import DriveLine
+from .motion import Motion
+from .moves import Move, OnCancel
+from .protocol import ComparatorReached, PositionReached, Stray
+from .settings import DriveSettings
+from .vocabulary import (
+    Comparator,
+    MovePlan,
+    SpeedStep,
+    check_line,
+    is_query,
+    plan_home,
+    plan_move_by,
+    plan_move_to,
+    starts_motion,
+)
+
+__all__ = ["Connecting", "Drive", "connect"]
+
+_MAX_STATUS: Final = 250
+
+
+def connect(url: str, *, name: str | None = None, settings: DriveSettings | None = None) -> Connecting:
+    """
+    Connect to one drive.
+
+    Await the result, and close the drive yourself, or use it as ``async with connect(url) as drive``: leaving the
+    block, however it ends, stops the moves that it started and closes the line.
+
+    Args:
+        url: ``serial:///dev/ttyUSB0?baudrate=9600``, ``tcp://host:4001``, ``unix:///run/drive.sock``,
+            ``loop://name``, ``sim://compax``, or a scheme that a plugin adds.
+        name: For errors, logs and results; the URL without its query if not given.
+        settings: Time-outs and what is known of this drive's ways.
+
+    Raises (when awaited or entered):
+        TransportError: The line cannot be opened; the error says why.
+        AnswerTimeoutError: Nothing on it answers as a COMPAX would.
+    """
+    return Connecting(url, name or str(TransportURL.parse(url)).partition("?")[0], settings or DriveSettings())
+
+
+class Connecting:
+    """A connection about to be made: awaitable, and an asynchronous context manager."""
+
+    def __init__(self, url: str, name: str, settings: DriveSettings) -> None:
+        self._url = url
+        self._name = name
+        self._settings = settings
+        self._drive: Drive | None = None
+
+    def __await__(self) -> Generator[Any, None, Drive]:
+        return self._open().__await__()
+
+    async def __aenter__(self) -> Drive:
+        self._drive = await self._open()
+        return self._drive
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        assert self._drive is not None
+        await self._drive.close()
+
+    async def _open(self) -> Drive:
+        drive = Drive(self._name, self._settings)
+        await drive._open(self._url)  # noqa: SLF001 - the two halves of one class
+        return drive
+
+
+class Drive:
+    """
+    One COMPAX drive on an open line; made by :func:`connect`.
+
+    Positions are in :attr:`unit`, counted from machine zero (P1 shifts them, UG p. 104). Every method that asks the
+    drive raises AnswerTimeoutError or ConnectionLostError when no answer comes, CommandRejectedError when the answer
+    is an error, UnexpectedAnswerError when it is something else.
+    """
+
+    def __init__(self, name: str, settings: DriveSettings) -> None:
+        self.name = name
+        self.settings = settings
+        self._events = EventHub()
+        self._loop = asyncio.get_running_loop()
+        self._line = DriveLine(name, settings, self._on_event, self._on_lost)
+        self._motion = Motion(self._line, settings, self._on_fault)
+
+    async def _open(self, url: str) -> None:
+        await self._line.link.open(url)
+
+    def __repr__(self) -> str:
+        return f"<Drive {self.name} {'open' if self.is_open else 'closed'}>"
+
+    # Motion ---------------------------------------------------------------------------------------------------------
+
+    def move_to(
+        self,
+        position: float,
+        *,
+        speed_percent: float | None = None,
+        acceleration_ms: int | None = None,
+        deceleration_ms: int | None = None,
+        steps: Iterable[SpeedStep | tuple[float, int]] = (),
+        comparators: Iterable[Comparator | tuple[float, int] | tuple[float, int, int]] = (),
+        timeout_s: float | None = None,
+        on_cancel: OnCancel = "stop",
+    ) -> Move:
+        """
+        Start an absolute move (``POSA``, UG p. 162) as soon as the line is free.
+
+        Args:
+            position: Target in :attr:`unit`, within ±4,000,000; rounded to the drive's decimals.
+            speed_percent: Of nominal speed, above 0; None keeps the last one.
+            acceleration_ms: 0 to 65,000, the time from standstill to nominal speed; None keeps the last one.
+            deceleration_ms: The same for braking.
+            steps: Speed steps ``(distance, speed_percent)``; with the comparators at most 8.
+            comparators: Outputs to set on the way, ``(distance, output)`` or ``(distance, output, value)``.
+            timeout_s: A fixed budget for the whole move; None: it may take as long as the axis moves.
+            on_cancel: ``"stop"`` stops the drive when the move is cancelled, ``"detach"`` lets it go on.
+
+        Returns:
+            A :class:`Move`; awaiting it returns at position reached (``$``, UG p. 160, or S16 and S17).
+
+        Raises:
+            InvalidCommandError: The drive cannot be told this; nothing was sent.
+            MoveActiveError: Another move is running; nothing was sent.
+            MoveInDoubtError: What became of the last move is unknown; see :meth:`reconcile`.
+            MoveError: Points prepared for a move that was not started would act on this one.
+
+        Awaiting the move raises MoveStoppedError, DriveFaultError, MoveTimeoutError or MoveInDoubtError for the
+        motion, CommandRejectedError, AnswerTimeoutError or ConnectionLostError for the line.
+        """
+        plan = plan_move_to(
+            position,
+            self.settings,
+            speed_percent=speed_percent,
+            acceleration_ms=acceleration_ms,
+            deceleration_ms=deceleration_ms,
+            steps=steps,
+            comparators=comparators,
+        )
+        return self.start(plan, timeout_s=timeout_s, on_cancel=on_cancel)
+
+    def move_by(
+        self,
+        distance: float,
+        *,
+        speed_percent: float | None = None,
+        acceleration_ms: int | None = None,
+        deceleration_ms: int | None = None,
+        steps: Iterable[SpeedStep | tuple[float, int]] = (),
+        comparators: Iterable[Comparator | tuple[float, int] | tuple[float, int, int]] = (),
+        timeout_s: float | None = None,
+        on_cancel: OnCancel = "stop",
+    ) -> Move:
+        """
+        Start a relative move (``POSR``, UG p. 162) as soon as the line is free; see :meth:`move_to`.
+
+        The target position (S2) is read first, so that the end can be told from the beginning.
+        """
+        plan = plan_move_by(
+            distance,
+            self.settings,
+            speed_percent=speed_percent,
+            acceleration_ms=acceleration_ms,
+            deceleration_ms=deceleration_ms,
+            steps=steps,
+            comparators=comparators,
+        )
+        return self.start(plan, timeout_s=timeout_s, on_cancel=on_cancel)
+
+    def home(self, *, timeout_s: float | None = None, on_cancel: OnCancel = "stop") -> Move:
+        """Find machine zero (``POSA HOME``, UG p. 162), confirmed by S16 bit 3; see :meth:`move_to`."""
+        return self.start(plan_home(self.settings), timeout_s=timeout_s, on_cancel=on_cancel)
+
+    def check(self, plan: MovePlan) -> None:
+        """Raise what :meth:`start` would raise, and do nothing."""
+        self._motion.check(plan)
+
+    def start(self, plan: MovePlan, *, timeout_s: float | None = None, on_cancel: OnCancel = "stop") -> Move:
+        """Start a motion that was planned for this drive before; see :meth:`move_to`."""
+        return self._motion.start(plan, timeout_s, on_cancel)
+
+    async def stop(self) -> None:
+        """
+        Stop the drive ahead of everything that is queued, and return at its standstill.
+
+        STOP is written before this first waits, if no exchange is in flight, and repeated until acknowledged. A move
+        that was running raises MoveStoppedError. Cancelling the caller does not take the stop back.
+
+        Raises:
+            AnswerTimeoutError, CommandRejectedError, ConnectionLostError: STOP was not acknowledged; the axis may move.
+            MoveTimeoutError: It was acknowledged, but the drive's command is still active.
+        """
+        await self._motion.stop()
+
+    async def quit(self) -> None:
+        """Acknowledge an error (QUIT, CAN-S p. 28); its text is part of the dialect."""
+        await self._line.command(self.settings.dialect.quit)
+
+    async def reconcile(self) -> DriveStatus:
+        """Read the status after a move was in doubt; from then on the drive takes motion again."""
+        return await self._motion.reconcile()
+
+    # Reading --------------------------------------------------------------------------------------------------------
+
+    async def position(self) -> float:
+        """Read the actual position (S1, UG p. 104) in :attr:`unit`."""
+        return await self._line.position()
+
+    async def target(self) -> float:
+        """Read the target position (S2, IBS p. 12) in :attr:`unit`."""
+        return await self._line.number(2)
+
+    async def following_error(self) -> float:
+        """Read set minus actual position (S3, IBS p. 38) in :attr:`unit`."""
+        return await self._line.number(3)
+
+    async def speed(self) -> float:
+        """Read the traverse speed (S4, IBS p. 70), by inference in % of nominal speed."""
+        return await self._line.number(4)
+
+    async def torque(self) -> float:
+        """Read the motor torque (S5, IBS p. 70), by inference in % of nominal torque."""
+        return await self._line.number(5)
+
+    async def status(self) -> DriveStatus:
+        """Read S16 and S17, every bit by its name (UG p. 209)."""
+        return await self._motion.read_status()
+
+    async def error(self) -> DeviceError | None:
+        """Read the error that is present (S30, IBS p. 12); None if there is none."""
+        return decode_error(await self._line.query("S30"))
+
+    async def error_history(self) -> tuple[HistoryEntry, ...]:
+        """Read the error history (S18, UG p. 209), newest first."""
+        return decode_history(await self._line.query("S18"))
+
+    async def read_status(self, number: int) -> StatusValue:
+        """
+        Read the status value ``S<number>``, decoded as far as its form is documented.
+
+        Raises:
+            InvalidCommandError: *number* is not a whole number from 1 to 250.
+        """
+        if isinstance(number, bool) or not isinstance(number, int) or not 1 <= number <= _MAX_STATUS:
+            raise InvalidCommandError(f"a status has a whole number from 1 to {_MAX_STATUS}, not {number!r}")
+        return decode_status_value(number, await self._line.query(f"S{number}"), self.unit)
+
+    # Raw ------------------------------------------------------------------------------------------------------------
+
+    async def command(self, text: str) -> str:
+        """
+        Send one line, and return what came before the prompt: nothing, for a command.
+
+        A motion that is started so is not watched; leaving the block stops the drive all the same.
+
+        Raises:
+            InvalidCommandError: *text* is not one plain line of at most 30 characters; nothing was sent.
+        """
+        line = check_line(text)
+        if is_query(line):
+            return await self._line.query(line)
+        if starts_motion(line):
+            self._motion.has_untracked_motion = True
+            await self._line.command(line, Lane.MOTION)
+        else:
+            await self._line.command(line)
+        return ""
+
+    async def query(self, text: str) -> str:
+        """
+        Ask one line, and return the whole answer: ``query("S1")`` gives ``"S001: 120.50"``.
+
+        Raises:
+            InvalidCommandError: *text* is not one plain line of at most 30 characters; nothing was sent.
+        """
+        return await self._line.ask_freely(check_line(text))
+
+    # Events and life ------------------------------------------------------------------------------------------------
+
+    def events(self) -> EventStream:
+        """Follow what happens from now on: messages, faults, the line; an asynchronous iterator."""
+        return self._events.stream()
+
+    @property
+    def unit(self) -> str:
+        """The name of the axis's unit, from the settings."""
+        return self.settings.unit
+
+    @property
+    def stats(self) -> LinkStats:
+        """Counters of the line."""
+        return self._line.link.stats
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the line is there."""
+        return self._line.link.is_open
+
+    async def close(self) -> None:
+        """
+        Stop what was started here, and close the line; harmless when repeated.
+
+        It is carried through even if the caller is cancelled meanwhile.
+
+        Raises:
+            AnswerTimeoutError, CommandRejectedError, MoveTimeoutError: The axis may not have stopped.
+        """
+        await despite_cancellation(self._close())
+
+    async def _close(self) -> None:
+        try:
+            if self.is_open:
+                await self._motion.end()
+        except ConnectionLostError:
+            pass  # whoever awaited the move has been told
+        finally:
+            await self._line.link.close()
+            self._events.end()
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        await self.close()
+
+    # What the line tells --------------------------------------------------------------------------------------------
+
+    def _on_event(self, event: Event) -> None:
+        at = self._loop.time()
+        if isinstance(event, PositionReached):
+            self._events.publish(PositionMessage(self.name, at))
+            self._motion.position_reached()
+        elif isinstance(event, ComparatorReached):
+            self._events.publish(ComparatorPassed(self.name, at, event.number))
+            self._motion.comparator_reached(event.number)
+        elif isinstance(event, Stray):
+            self.stats.strays += 1
+            self._events.publish(UnexpectedText(self.name, at, event.text))
+
+    def _on_fault(self, error: DeviceError | None) -> None:
+        self._events.publish(Fault(self.name, self._loop.time(), error))
+
+    def _on_lost(self, error: ConnectionLostError) -> None:
+        self._events.publish(ConnectionLost(self.name, self._loop.time(), str(error)))
+        self._motion.line_lost()

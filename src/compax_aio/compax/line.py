@@ -1,0 +1,136 @@
+"""One drive's line as the client uses it: a text in, a checked answer or an error that tells the story out."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import TypeVar
+
+from ..errors import CommandRejectedError, ConnectionLostError, UnexpectedAnswerError
+from ..link.contract import Event, Lane, TurnOver
+from ..link.link import Link
+from .codecs import DriveStatus, decode_number
+from .facts.device_errors import device_error
+from .protocol import Acknowledged, Answered, CompaxProtocol, Rejected, UnexpectedAnswer
+from .settings import DriveSettings
+
+__all__ = ["DriveLine"]
+
+_Value = TypeVar("_Value")
+
+
+class DriveLine:
+    """
+    A link that speaks COMPAX, with answers turned into values and errors.
+
+    Args:
+        name: Of the drive.
+        settings: Time-outs and what is known of the drive's ways.
+        on_event: Called with messages and strays as they are read.
+        on_lost: Called when the line goes away.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        settings: DriveSettings,
+        on_event: Callable[[Event], None],
+        on_lost: Callable[[ConnectionLostError], None],
+    ) -> None:
+        self.name = name
+        self.protocol = CompaxProtocol(settings.message_form)
+        self.link = Link(
+            self.protocol,
+            name=name,
+            answer_timeout_s=settings.answer_timeout_s,
+            resync_attempts=settings.resync_attempts,
+            on_event=on_event,
+            on_lost=on_lost,
+        )
+        self.last_position: float | None = None
+
+    async def query(self, text: str, lane: Lane = Lane.READ) -> str:
+        """
+        Ask, and return the answer as it came.
+
+        Raises:
+            CommandRejectedError: The drive answered with an error.
+            UnexpectedAnswerError: It acknowledged a question instead of answering it.
+            AnswerTimeoutError, ConnectionLostError: No answer came.
+        """
+        outcome = await self.link.exchange(text, lane)
+        if isinstance(outcome, Answered):
+            return outcome.text
+        raise self.error_of(text, outcome)
+
+    async def ask_freely(self, text: str) -> str:
+        """Ask something whose answer has no known beginning; whatever text comes is the answer."""
+        outcome = await self.link.exchange(text, Lane.READ)
+        if isinstance(outcome, Answered | UnexpectedAnswer):
+            return outcome.text
+        raise self.error_of(text, outcome)
+
+    async def command(self, text: str, lane: Lane = Lane.CONTROL) -> None:
+        """
+        Tell, and return when the drive has acknowledged it.
+
+        After a time-out the line is brought back in step first, for the acknowledgement may come late.
+
+        Raises:
+            CommandRejectedError: The drive answered with an error.
+            UnexpectedAnswerError: It answered something else; whether it was accepted is unknown.
+            AnswerTimeoutError, ConnectionLostError: Whether it was accepted is unknown.
+        """
+        outcome = await self.link.exchange(text, lane, settles_late=True)
+        if not isinstance(outcome, Acknowledged):
+            raise self.error_of(text, outcome)
+
+    async def number(self, number: int, lane: Lane = Lane.READ) -> float:
+        """Read the status value ``S<number>``; see :meth:`query` for errors."""
+        return self._decoded(decode_number, await self.query(f"S{number}", lane))
+
+    async def position(self, lane: Lane = Lane.READ) -> float:
+        """Read S1, the actual position (UG p. 104), and remember it."""
+        self.last_position = await self.number(1, lane)
+        return self.last_position
+
+    async def status(self, lane: Lane = Lane.READ) -> DriveStatus:
+        """Read S17, then S16: a move that ends in between shows as ended."""
+        s17 = await self.query("S17", lane)
+        s16 = await self.query("S16", lane)
+        return self._decoded(lambda answer: DriveStatus.decode(answer, s17), s16)
+
+    def exchange(self, text: str, lane: Lane, on_sent: Callable[[], None] | None = None) -> asyncio.Future[TurnOver]:
+        """Queue *text*, written at once if the line is free; see :meth:`Link.exchange`."""
+        return self.link.exchange(text, lane, settles_late=True, on_sent=on_sent)
+
+    def error_of(self, text: str, outcome: TurnOver) -> CommandRejectedError | UnexpectedAnswerError:
+        """Turn an answer that is no success into the error that says so."""
+        if isinstance(outcome, Rejected):
+            error = device_error(outcome.code)
+            return CommandRejectedError(
+                f"the drive rejected it with E{error.code}, {error.meaning}",
+                device=self.name,
+                sent=text,
+                received=outcome.text,
+                hint=error.remedy,
+                code=error.code,
+                exchanges=self.link.recent(),
+            )
+        received = outcome.text if isinstance(outcome, Answered | UnexpectedAnswer) else "a bare prompt"
+        return UnexpectedAnswerError(
+            "that is no answer to what was sent",
+            device=self.name,
+            sent=text,
+            received=received,
+            hint="look at the last exchanges of this error; is it a COMPAX, and does nobody else use the line?",
+            exchanges=self.link.recent(),
+        )
+
+    def _decoded(self, decode: Callable[[str], _Value], answer: str) -> _Value:
+        try:
+            return decode(answer)
+        except UnexpectedAnswerError as error:
+            error.device = self.name
+            error.exchanges = self.link.recent()
+            raise

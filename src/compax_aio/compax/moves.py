@@ -1,0 +1,192 @@
+"""A move as the caller holds it: a future of its result, that can be watched, stopped and cancelled."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
+
+from ..errors import CompaxError
+from .vocabulary import MovePlan
+
+__all__ = ["Move", "MoveOwner", "MoveResult", "OnCancel"]
+
+OnCancel = Literal["stop", "detach"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MoveResult:
+    """How a move ended that reached its target."""
+
+    drive: str
+    target: float | None
+    """As rounded to the drive's decimals, in its unit. For a relative move: the target position read before, plus
+    the distance. None for the search for machine zero."""
+    confirmed_by: Literal["message", "status"]
+    """``message``: the drive sent ``$``. ``status``: S16 and S17 were asked."""
+    started_at: float
+    """Loop time when the line that starts the motion was written."""
+    finished_at: float
+    """Loop time when the confirmation was read."""
+    last_position: float | None
+    """What the drive last sent as its position, usually on the way; None if it was never asked."""
+
+    @property
+    def duration_s(self) -> float:
+        """Seconds from the start being written to the confirmation being read."""
+        return self.finished_at - self.started_at
+
+
+class MoveOwner(Protocol):
+    """What a move needs of the drive it runs on."""
+
+    name: str
+
+    def abandon(self, move: Move) -> None:
+        """Deal with a move that was cancelled."""
+
+    async def stop_move(self, move: Move) -> None:
+        """Stop the drive, if *move* still runs."""
+
+    async def read_position(self) -> float:
+        """Ask the drive where it is."""
+
+
+class Move(asyncio.Future[MoveResult]):
+    """
+    A motion under way; awaiting it gives a :class:`MoveResult`, or raises why the target was not reached.
+
+    Cancelling it (also by a time-out around it, a failing task group, Ctrl-C) stops the drive, unless it was made
+    with ``on_cancel="detach"``; then the drive goes on, unwatched.
+
+    Attributes:
+        accepted: A future that is done when the drive's prompt came back, or raises why it did not.
+        target: The absolute target, rounded to the drive's decimals; None as long as only the drive knows it.
+        plan: What is said to the drive.
+    """
+
+    def __init__(self, owner: MoveOwner, plan: MovePlan, on_cancel: OnCancel, comparators: int) -> None:
+        super().__init__()
+        self.accepted: asyncio.Future[None] = self.get_loop().create_future()
+        # Whoever awaits only the move learns the same error there.
+        self.accepted.add_done_callback(_retrieve)
+        self.plan = plan
+        self.target = plan.target
+        self.on_cancel = on_cancel
+        self.started_at: float | None = None
+        self.reached_comparators: list[int] = []
+        self._comparators_expected = comparators
+        self._owner = owner
+        self._changed = asyncio.Event()
+        self.add_done_callback(lambda _: self._changed.set())
+
+    @property
+    def is_on_wire(self) -> bool:
+        """Whether the line that starts the motion was written."""
+        return self.started_at is not None
+
+    def cancel(self, msg: Any = None) -> bool:
+        """Give the move up; STOP is written before this returns, if the line is free and the drive may be moving."""
+        if not super().cancel(msg):
+            return False
+        self.accepted.cancel(msg)
+        self._owner.abandon(self)
+        return True
+
+    async def stop(self) -> None:
+        """
+        Stop the drive, and return at its standstill; the move then raises MoveStoppedError.
+
+        A move that has ended already is left as it is.
+
+        Raises:
+            AnswerTimeoutError, CommandRejectedError, MoveTimeoutError, ConnectionLostError: It may not have stopped.
+        """
+        await self._owner.stop_move(self)
+
+    async def positions(self, *, interval_s: float = 0.05) -> AsyncIterator[float]:
+        """
+        Yield the actual position (S1, UG p. 104) while the move runs, and once at its end.
+
+        Args:
+            interval_s: Shortest time between two readings; the line sets a limit of its own (9600 baud: about 24 ms).
+
+        Yields:
+            Positions in the drive's unit. Errors end the iteration: awaiting the move raises them.
+        """
+        last_reading = False
+        while not last_reading:
+            last_reading = self.done()
+            try:
+                yield await self._owner.read_position()
+            except CompaxError:
+                return
+            if not last_reading:
+                await self._wait_for_change(interval_s)
+
+    async def comparators(self) -> AsyncIterator[int]:
+        """
+        Yield the number of each comparator as the drive passes it (UG p. 162), until all are passed or the move ends.
+
+        Numbers count in the order in which the comparators were given, from 1, whatever their distance.
+        """
+        seen = 0
+        while True:
+            while seen < len(self.reached_comparators):
+                seen += 1
+                yield self.reached_comparators[seen - 1]
+            if self.done() or seen >= self._comparators_expected:
+                return
+            await self._wait_for_change(None)
+
+    async def _wait_for_change(self, at_most_s: float | None) -> None:
+        """Wait until a comparator is passed, the move ends, or *at_most_s* has gone by."""
+        self._changed.clear()
+        if self.done():
+            return
+        try:
+            async with asyncio.timeout(at_most_s):
+                await self._changed.wait()
+        except TimeoutError:
+            pass
+
+    # What the drive tells it ----------------------------------------------------------------------------------------
+
+    def note_accepted(self) -> None:
+        """Note that the prompt came back."""
+        if not self.accepted.done():
+            self.accepted.set_result(None)
+
+    def note_comparator(self, number: int) -> None:
+        """Note that comparator *number* was passed."""
+        self.reached_comparators.append(number)
+        self._changed.set()
+
+    def finish(self, confirmed_by: Literal["message", "status"], last_position: float | None) -> None:
+        """Note that the drive confirmed the target."""
+        self.note_accepted()
+        if not self.done():
+            assert self.started_at is not None
+            self.set_result(
+                MoveResult(
+                    drive=self._owner.name,
+                    target=self.target,
+                    confirmed_by=confirmed_by,
+                    started_at=self.started_at,
+                    finished_at=self.get_loop().time(),
+                    last_position=last_position,
+                )
+            )
+
+    def fail(self, make_error: Callable[[], CompaxError]) -> None:
+        """Raise what *make_error* makes, in whoever awaits the move or its acceptance."""
+        if not self.accepted.done():
+            self.accepted.set_exception(make_error())
+        if not self.done():
+            self.set_exception(make_error())
+
+
+def _retrieve(future: asyncio.Future[None]) -> None:
+    if not future.cancelled():
+        future.exception()

@@ -1,0 +1,296 @@
+"""Intent into lines: every command of a move, checked here before a byte is sent (UG p. 100-101, 162)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from decimal import Decimal
+from math import isfinite
+from numbers import Real
+from typing import Final, TypeVar
+
+from ..errors import InvalidCommandError
+from .facts.limits import (
+    MAX_ACCELERATION_TIME_MS,
+    MAX_POSITION,
+    MAX_PREPARED_POINTS,
+    OUTPUT_NUMBERS,
+    SPEED_DECIMALS,
+)
+from .facts.line import (
+    ECHO_SIGN,
+    EXECUTE_SIGN,
+    MAX_LINE_LENGTH,
+    POSITION_REACHED_SIGN,
+    STORE_SIGN,
+)
+from .settings import DriveSettings
+
+__all__ = [
+    "Comparator",
+    "MovePlan",
+    "SpeedStep",
+    "check_line",
+    "is_query",
+    "plan_home",
+    "plan_move_by",
+    "plan_move_to",
+    "starts_motion",
+]
+
+_Point = TypeVar("_Point")
+
+_QUERY: Final = re.compile(r"[SPVN]\d{1,3}")
+_MOTION: Final = re.compile(r"\s*(P\s*O\s*S|P\s*[AHR]|L\s*O\s*O\s*P|S\s*T\s*A\s*R\s*T|W\s*A\s*I\s*T)", re.IGNORECASE)
+_PREPARED: Final = re.compile(r"S\s*P\s*E\s*E\s*D|S\s*D|O\s*U\s*T|O\s*T", re.IGNORECASE)
+
+_SIGNS: Final = frozenset({POSITION_REACHED_SIGN, STORE_SIGN, EXECUTE_SIGN, ECHO_SIGN, ">"})
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedStep:
+    """
+    From *distance* on, counted from the start of the move and always positive, go at *speed_percent* (UG p. 101).
+
+    A plain tuple ``(distance, speed_percent)`` does as well.
+    """
+
+    distance: float
+    speed_percent: int
+
+
+@dataclass(frozen=True, slots=True)
+class Comparator:
+    """
+    At *distance* from the start of the move, always positive, set *output* to *value* (UG p. 101, 162).
+
+    The drive reports it with its number, which is the order of programming, from 1. A plain tuple
+    ``(distance, output)`` or ``(distance, output, value)`` does as well.
+    """
+
+    distance: float
+    output: int
+    value: int = 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MovePlan:
+    """What a move says to the drive, in order, and where it leads."""
+
+    description: str
+    """For errors: ``move_to(120.5)``."""
+    target: float | None = None
+    """As rounded to the drive's decimals; None where only the drive knows it."""
+    distance: float | None = None
+    """Of a relative move, as rounded."""
+    settings_lines: tuple[str, ...] = ()
+    """SPEED, ACCEL, ACCEL-: in force from the next positioning on."""
+    point_lines: tuple[str, ...] = ()
+    """Speed steps and comparators: prepared for the next positioning."""
+    motion: str
+    """The line that starts the motion, without ``$``."""
+    may_ask_for_message: bool = True
+    """Whether ``$`` applies: to POSA and POSR only (UG p. 160)."""
+    finds_machine_zero: bool = False
+
+
+def plan_move_to(
+    position: float,
+    settings: DriveSettings,
+    *,
+    speed_percent: float | None = None,
+    acceleration_ms: int | None = None,
+    deceleration_ms: int | None = None,
+    steps: Iterable[SpeedStep | tuple[float, int]] = (),
+    comparators: Iterable[Comparator | tuple[float, int] | tuple[float, int, int]] = (),
+) -> MovePlan:
+    """
+    Plan an absolute move.
+
+    Raises:
+        InvalidCommandError: A number is not finite, out of range, or cannot be said to this drive.
+    """
+    target = _position("position", position, settings)
+    return MovePlan(
+        description=f"move_to({_written(target, settings.decimals)})",
+        target=target,
+        settings_lines=_settings_lines(settings, speed_percent, acceleration_ms, deceleration_ms),
+        point_lines=_point_lines(settings, steps, comparators),
+        motion=check_line(f"PA{_written(target, settings.decimals)}", room_for_sign=True),
+    )
+
+
+def plan_move_by(
+    distance: float,
+    settings: DriveSettings,
+    *,
+    speed_percent: float | None = None,
+    acceleration_ms: int | None = None,
+    deceleration_ms: int | None = None,
+    steps: Iterable[SpeedStep | tuple[float, int]] = (),
+    comparators: Iterable[Comparator | tuple[float, int] | tuple[float, int, int]] = (),
+) -> MovePlan:
+    """
+    Plan a relative move.
+
+    Raises:
+        InvalidCommandError: A number is not finite, out of range, or cannot be said to this drive.
+    """
+    rounded = _position("distance", distance, settings)
+    return MovePlan(
+        description=f"move_by({_written(rounded, settings.decimals)})",
+        distance=rounded,
+        settings_lines=_settings_lines(settings, speed_percent, acceleration_ms, deceleration_ms),
+        point_lines=_point_lines(settings, steps, comparators),
+        motion=check_line(f"PR{_written(rounded, settings.decimals)}", room_for_sign=True),
+    )
+
+
+def plan_home(settings: DriveSettings) -> MovePlan:
+    """Plan the search for machine zero (POSA HOME, UG p. 162); whether it takes ``$`` is not documented."""
+    return MovePlan(
+        description="home()",
+        motion=check_line(settings.dialect.home),
+        may_ask_for_message=False,
+        finds_machine_zero=True,
+    )
+
+
+def check_line(text: str, *, room_for_sign: bool = False) -> str:
+    """
+    Return *text* without blanks around it, if it is one line that the drive can be told.
+
+    Raises:
+        InvalidCommandError: It is empty, longer than the entry buffer (30 characters, UG p. 160), not printable
+            ASCII, or holds a character that carries meaning: CR, LF, ``$ ? ! , >``.
+    """
+    line = text.strip(" ")
+    for character in line:
+        if character in _SIGNS:
+            raise InvalidCommandError(
+                f"{character!r} in {text!r} is a sign of the line, not part of a command",
+                hint="moves ask for their message themselves; send one plain command at a time",
+            )
+        if not " " <= character <= "~":
+            raise InvalidCommandError(
+                f"{character!r} in {text!r} cannot be sent: a line is printable ASCII (UG p. 160)",
+                hint="send one command at a time, without its end sign",
+            )
+    longest = MAX_LINE_LENGTH - room_for_sign
+    if not line or len(line) > longest:
+        raise InvalidCommandError(
+            f"{text!r} has {len(line)} characters; the drive's entry buffer takes 1 to {longest} (UG p. 160)",
+            hint="use the short forms of the commands (PA, PR, SD, AL, OT) and leave out blanks",
+        )
+    return line
+
+
+def is_query(line: str) -> bool:
+    """Whether *line* asks for a status, parameter, variable or record, and its answer begins with the same."""
+    return _QUERY.fullmatch(line) is not None
+
+
+def starts_motion(line: str) -> bool:
+    """Whether *line* sets the axis in motion (UG p. 162), or the program that may; prepared points do not."""
+    return _MOTION.match(line) is not None and not _PREPARED.search(line)
+
+
+def _settings_lines(
+    settings: DriveSettings, speed_percent: float | None, acceleration_ms: int | None, deceleration_ms: int | None
+) -> tuple[str, ...]:
+    lines = []
+    if speed_percent is not None:
+        speed = _number("speed_percent", speed_percent)
+        if not 0 < speed <= settings.speed_limit_percent or round(speed, SPEED_DECIMALS) == 0:
+            raise InvalidCommandError(
+                f"speed_percent must be above 0 and at most {settings.speed_limit_percent:g}, not {speed_percent!r}",
+                hint="DriveSettings.speed_limit_percent allows more, up to 600",
+            )
+        lines.append(check_line(f"SD{_written(speed, SPEED_DECIMALS)}"))
+    if acceleration_ms is not None:
+        lines.append(check_line(f"AL{_ramp_time('acceleration_ms', acceleration_ms)}"))
+    if deceleration_ms is not None:
+        lines.append(check_line(f"AL-{_ramp_time('deceleration_ms', deceleration_ms)}"))
+    return tuple(lines)
+
+
+def _point_lines(
+    settings: DriveSettings,
+    steps: Iterable[SpeedStep | tuple[float, int]],
+    comparators: Iterable[Comparator | tuple[float, int] | tuple[float, int, int]],
+) -> tuple[str, ...]:
+    lines = []
+    for each in steps:
+        step = each if isinstance(each, SpeedStep) else _of_tuple(SpeedStep, each)
+        speed = _number("speed_percent of a speed step", step.speed_percent)
+        if speed != int(speed) or not 0 < speed <= settings.speed_limit_percent:
+            raise InvalidCommandError(
+                f"the speed of a speed step is a whole number from 1 to {settings.speed_limit_percent:g} (UG p. 101), "
+                f"not {step.speed_percent!r}"
+            )
+        lines.append(f"PR{_point_distance(step.distance, settings)} SD{int(speed)}")
+    for item in comparators:
+        comparator = item if isinstance(item, Comparator) else _of_tuple(Comparator, item)
+        if comparator.output not in OUTPUT_NUMBERS or comparator.value not in (0, 1):
+            raise InvalidCommandError(
+                f"a comparator sets one of the outputs 1 to {OUTPUT_NUMBERS[-1]} to 0 or 1, "
+                f"not output {comparator.output!r} to {comparator.value!r}"
+            )
+        distance = _point_distance(comparator.distance, settings)
+        lines.append(f"PR{distance} OT O{int(comparator.output)}={int(comparator.value)}")
+    if len(lines) > MAX_PREPARED_POINTS:
+        raise InvalidCommandError(
+            f"a move takes at most {MAX_PREPARED_POINTS} speed steps and comparators together (UG p. 101), "
+            f"not {len(lines)}"
+        )
+    return tuple(check_line(line) for line in lines)
+
+
+def _of_tuple(kind: type[_Point], values: object) -> _Point:
+    try:
+        return kind(*values)  # type: ignore[misc]
+    except TypeError:
+        raise InvalidCommandError(f"{values!r} is no {kind.__name__}") from None
+
+
+def _point_distance(distance: float, settings: DriveSettings) -> str:
+    rounded = _position("distance of a point", distance, settings)
+    if rounded <= 0:
+        raise InvalidCommandError(
+            f"the distance of a speed step or comparator counts from the start of the move and is positive "
+            f"(UG p. 101), not {distance!r}"
+        )
+    return _written(rounded, settings.decimals)
+
+
+def _position(what: str, value: float, settings: DriveSettings) -> float:
+    number = round(_number(what, value), settings.decimals)
+    if abs(number) > MAX_POSITION:
+        raise InvalidCommandError(f"{what} must be within ±{MAX_POSITION:,.0f} {settings.unit}, not {value!r}")
+    return number + 0.0  # no -0.0
+
+
+def _ramp_time(what: str, value: int) -> int:
+    number = _number(what, value)
+    if number != int(number) or not 0 <= number <= MAX_ACCELERATION_TIME_MS:
+        raise InvalidCommandError(
+            f"{what} must be a whole number of milliseconds from 0 to {MAX_ACCELERATION_TIME_MS} (IBS p. 48), "
+            f"not {value!r}"
+        )
+    return int(number)
+
+
+def _number(what: str, value: object) -> float:
+    if isinstance(value, bool) or not (isinstance(value, Real | Decimal)):
+        raise InvalidCommandError(f"{what} must be a number, not {value!r}")
+    number = float(value)
+    if not isfinite(number):
+        raise InvalidCommandError(f"{what} must be finite, not {value!r}")
+    return number
+
+
+def _written(number: float, decimals: int) -> str:
+    """Write *number* as short as it goes: bytes on the wire are the cost."""
+    text = f"{number:.{decimals}f}".rstrip("0").rstrip(".")
+    return "0" if text == "-0" else text
