@@ -33,6 +33,7 @@ from .facts.device_errors import DeviceError
 from .line import DriveLine
 from .motion import Motion
 from .moves import Move, OnCancel
+from .observer import Observer
 from .protocol import ComparatorReached, PositionReached, Stray
 from .settings import DriveSettings
 from .vocabulary import (
@@ -115,7 +116,8 @@ class Drive:
         self._events = EventHub()
         self._loop = asyncio.get_running_loop()
         self._line = DriveLine(name, settings, self._on_event, self._on_lost)
-        self._motion = Motion(self._line, settings, self._on_fault)
+        self._observer = Observer(self._line, settings, self._on_fault)
+        self._motion = Motion(self._observer, settings)
 
     async def _open(self, url: str) -> None:
         await self._line.link.open(url)
@@ -258,7 +260,7 @@ class Drive:
 
     async def status(self) -> DriveStatus:
         """Read S16 and S17, every bit by its name (UG p. 209)."""
-        return await self._motion.read_status()
+        return await self._observer.read_status(Lane.READ)
 
     async def error(self) -> DeviceError | None:
         """Read the error that is present (S30, IBS p. 12); None if there is none."""

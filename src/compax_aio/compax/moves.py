@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
@@ -64,9 +64,10 @@ class Move(asyncio.Future[MoveResult]):
         accepted: A future that is done when the drive's prompt came back, or raises why it did not.
         target: The absolute target, rounded to the drive's decimals; None as long as only the drive knows it.
         plan: What is said to the drive.
+        sent: The line that started the motion, as it was written; None until then.
     """
 
-    def __init__(self, owner: MoveOwner, plan: MovePlan, on_cancel: OnCancel, comparators: int) -> None:
+    def __init__(self, owner: MoveOwner, plan: MovePlan, on_cancel: OnCancel) -> None:
         super().__init__()
         self.accepted: asyncio.Future[None] = self.get_loop().create_future()
         # Whoever awaits only the move learns the same error there.
@@ -74,9 +75,9 @@ class Move(asyncio.Future[MoveResult]):
         self.plan = plan
         self.target = plan.target
         self.on_cancel = on_cancel
+        self.sent: str | None = None
         self.started_at: float | None = None
-        self.reached_comparators: list[int] = []
-        self._comparators_expected = comparators
+        self._passed: list[int] = []
         self._owner = owner
         self._changed = asyncio.Event()
         self.add_done_callback(lambda _: self._changed.set())
@@ -133,10 +134,10 @@ class Move(asyncio.Future[MoveResult]):
         """
         seen = 0
         while True:
-            while seen < len(self.reached_comparators):
+            while seen < len(self._passed):
                 seen += 1
-                yield self.reached_comparators[seen - 1]
-            if self.done() or seen >= self._comparators_expected:
+                yield self._passed[seen - 1]
+            if self.done() or seen >= self.plan.comparators:
                 return
             await self._wait_for_change(None)
 
@@ -153,6 +154,10 @@ class Move(asyncio.Future[MoveResult]):
 
     # What the drive tells it ----------------------------------------------------------------------------------------
 
+    def note_sent(self, text: str) -> None:
+        """Note that the line which starts the motion was written."""
+        self.sent, self.started_at = text, self.get_loop().time()
+
     def note_accepted(self) -> None:
         """Note that the prompt came back."""
         if not self.accepted.done():
@@ -160,8 +165,9 @@ class Move(asyncio.Future[MoveResult]):
 
     def note_comparator(self, number: int) -> None:
         """Note that comparator *number* was passed."""
-        self.reached_comparators.append(number)
-        self._changed.set()
+        if len(self._passed) < self.plan.comparators:
+            self._passed.append(number)
+            self._changed.set()
 
     def finish(self, confirmed_by: Literal["message", "status"], last_position: float | None) -> None:
         """Note that the drive confirmed the target."""
@@ -179,12 +185,12 @@ class Move(asyncio.Future[MoveResult]):
                 )
             )
 
-    def fail(self, make_error: Callable[[], CompaxError]) -> None:
-        """Raise what *make_error* makes, in whoever awaits the move or its acceptance."""
+    def fail(self, error: CompaxError) -> None:
+        """Raise *error* in whoever awaits the move, or its acceptance."""
         if not self.accepted.done():
-            self.accepted.set_exception(make_error())
+            self.accepted.set_exception(error)
         if not self.done():
-            self.set_exception(make_error())
+            self.set_exception(error)
 
 
 def _retrieve(future: asyncio.Future[None]) -> None:

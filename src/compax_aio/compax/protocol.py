@@ -381,6 +381,9 @@ class CompaxProtocol:
             self._notice(Stray(line))
         elif self.state is State.AWAITING_ANSWER:
             self._end_turn(Answered(line))
+        elif self.state is State.AWAITING_MARKER and asked is self._ledger[-1]:
+            self._ledger.clear()
+            self._notice(InStep())
         else:
             self._end_late(asked, Answered(line))
 

@@ -1,14 +1,12 @@
-"""What one look at the status says about a pending move; plain values in, a verdict out."""
+"""What one look at the drive says about a pending move; plain values in, a verdict out."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import Enum
 
 from .codecs import DriveStatus
-from .vocabulary import MovePlan
 
-__all__ = ["Look", "Verdict", "judge"]
+__all__ = ["Verdict", "judge"]
 
 
 class Verdict(Enum):
@@ -21,32 +19,22 @@ class Verdict(Enum):
     UNCLEAR = "the drive stands, and does not say why"
 
 
-@dataclass(frozen=True, slots=True)
-class Look:
-    """The status and actual position of a drive, read one after the other."""
-
-    status: DriveStatus
-    position: float | None
-    """S1, or None where it cannot be read."""
-
-
-def judge(look: Look, plan: MovePlan, target: float | None, tolerance: float) -> Verdict:
+def judge(status: DriveStatus, *, is_at_target: bool, finds_machine_zero: bool) -> Verdict:
     """
     Say how a move stands that the drive has accepted.
 
     "Position reached" alone proves nothing: it may be that of an earlier move, when this one was lost on a drive that
-    keeps quiet about errors. So the position must agree, within *tolerance*.
+    keeps quiet about errors. So the position read must agree; for the search for machine zero, S16 bit 3.
     """
-    status = look.status
     if not status.no_fault:
         return Verdict.FAULT
     if status.command_active:
         return Verdict.MOVING
-    if plan.finds_machine_zero:
-        arrived = status.machine_zero_approached and not status.idle_after_stop
+    if finds_machine_zero:
+        reached = status.machine_zero_approached and not status.idle_after_stop
     else:
-        arrived = look.position is not None and target is not None and abs(look.position - target) <= tolerance
-    if arrived and (status.position_reached or plan.finds_machine_zero):
+        reached = status.position_reached and is_at_target
+    if reached:
         return Verdict.REACHED
     if status.idle_after_stop or status.stopped_by_input:
         return Verdict.STOPPED

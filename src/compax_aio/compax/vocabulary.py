@@ -88,6 +88,8 @@ class MovePlan:
     """SPEED, ACCEL, ACCEL-: in force from the next positioning on."""
     point_lines: tuple[str, ...] = ()
     """Speed steps and comparators: prepared for the next positioning."""
+    comparators: int = 0
+    """How many of the points are comparators."""
     motion: str
     """The line that starts the motion, without ``$``."""
     may_ask_for_message: bool = True
@@ -116,7 +118,8 @@ def plan_move_to(
         description=f"move_to({_written(target, settings.decimals)})",
         target=target,
         settings_lines=_settings_lines(settings, speed_percent, acceleration_ms, deceleration_ms),
-        point_lines=_point_lines(settings, steps, comparators),
+        point_lines=_point_lines(settings, steps, points := tuple(comparators)),
+        comparators=len(points),
         motion=check_line(f"PA{_written(target, settings.decimals)}", room_for_sign=True),
     )
 
@@ -142,7 +145,8 @@ def plan_move_by(
         description=f"move_by({_written(rounded, settings.decimals)})",
         distance=rounded,
         settings_lines=_settings_lines(settings, speed_percent, acceleration_ms, deceleration_ms),
-        point_lines=_point_lines(settings, steps, comparators),
+        point_lines=_point_lines(settings, steps, points := tuple(comparators)),
+        comparators=len(points),
         motion=check_line(f"PR{_written(rounded, settings.decimals)}", room_for_sign=True),
     )
 

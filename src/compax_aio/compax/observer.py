@@ -1,0 +1,107 @@
+"""Looking at a drive: status and position as they are, faults told once, patience with a line in trouble."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from ..errors import CommandRejectedError, CompaxError, ConnectionLostError, UnexpectedAnswerError
+from ..link.contract import Lane
+from .codecs import DriveStatus, decode_error
+from .facts.device_errors import DeviceError
+from .line import DriveLine
+from .settings import DriveSettings
+
+__all__ = ["Look", "Observer"]
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """The status and actual position of a drive, read one after the other."""
+
+    status: DriveStatus
+    position: float | None
+    """S1, or None where it cannot be read."""
+
+    @property
+    def as_sent(self) -> str:
+        """The status as the drive sent it, for errors."""
+        return f"S16 {self.status.s16}, S17 {self.status.s17}"
+
+
+class Observer:
+    """
+    Reads what the library itself wants to know of a drive, ahead of what callers have queued.
+
+    Args:
+        line: The drive's line.
+        settings: Decimals, and how patient to be.
+        on_fault: Called when a status that was read shows a fault, once for each.
+    """
+
+    def __init__(
+        self, line: DriveLine, settings: DriveSettings, on_fault: Callable[[DeviceError | None], None]
+    ) -> None:
+        self.line = line
+        self._settings = settings
+        self._on_fault = on_fault
+        self._faulted = False
+        self._tolerance = 5 * 10.0**-settings.decimals
+
+    async def read_status(self, lane: Lane = Lane.CONTROL) -> DriveStatus:
+        """Read S16 and S17; a fault they show is told to whoever follows the drive's events."""
+        status = await self.line.status(lane)
+        if status.no_fault:
+            self._faulted = False
+        elif not self._faulted:
+            self._faulted = True
+            self._on_fault(await self.read_error())
+        return status
+
+    async def read_error(self) -> DeviceError | None:
+        """Read S30; None also where the drive does not say."""
+        try:
+            return decode_error(await self.line.query("S30", Lane.CONTROL))
+        except (CommandRejectedError, UnexpectedAnswerError):
+            return None
+
+    async def look(self) -> Look:
+        """Read status, then position."""
+        status = await self.read_status()
+        try:
+            position: float | None = await self.line.position(Lane.CONTROL)
+        except (CommandRejectedError, UnexpectedAnswerError):
+            position = None
+        return Look(status, position)
+
+    async def look_patiently(self) -> Look:
+        """Look, again and again if need be; raise the last error when it has failed for ``in_doubt_after_s``."""
+        loop = asyncio.get_running_loop()
+        give_up_at = loop.time() + self._settings.in_doubt_after_s
+        while True:
+            try:
+                return await self.look()
+            except ConnectionLostError:
+                raise
+            except CompaxError:
+                if loop.time() >= give_up_at:
+                    raise
+            await asyncio.sleep(self._settings.poll_first_s)
+
+    async def commanded_position(self) -> float:
+        """Read S2, the target position (IBS p. 12), or S1 from a drive that has none to give."""
+        try:
+            return await self.line.number(2, Lane.CONTROL)
+        except (CommandRejectedError, UnexpectedAnswerError):
+            return await self.line.position(Lane.CONTROL)
+
+    def is_near(self, position: float | None, target: float | None) -> bool:
+        """Whether two positions are the same but for a few of the last decimals."""
+        return position is not None and target is not None and abs(position - target) <= self._tolerance
+
+    def written(self, position: float | None) -> str:
+        """Write a position for an error."""
+        if position is None:
+            return "an unknown position"
+        return f"{position:.{self._settings.decimals}f} {self._settings.unit}"

@@ -1,0 +1,113 @@
+"""The errors that a move ends with: what happened, where the axis is, what to do next."""
+
+from __future__ import annotations
+
+from ..errors import (
+    CompaxError,
+    ConnectionLostError,
+    DriveFaultError,
+    MoveInDoubtError,
+    MoveStoppedError,
+    MoveTimeoutError,
+)
+from .facts.device_errors import DeviceError
+from .moves import Move
+from .observer import Look, Observer
+
+__all__ = ["Reports"]
+
+
+class Reports:
+    """Writes the errors of one drive's moves."""
+
+    def __init__(self, name: str, observer: Observer) -> None:
+        self._name = name
+        self._observer = observer
+
+    def withdrawn(self, move: Move) -> MoveStoppedError:
+        """Report a move that was stopped before its motion was sent."""
+        return MoveStoppedError(f"{move.plan.description} was stopped before it was sent", device=self._name)
+
+    def unwatched(self, move: Move) -> ConnectionLostError:
+        """Report a move that goes on although nobody watches it any more, as was asked for."""
+        return ConnectionLostError(
+            f"the line was closed; {move.plan.description} goes on unwatched", device=self._name, sent=move.sent
+        )
+
+    def stopped(self, move: Move, look: Look) -> MoveStoppedError:
+        """Report a move that was stopped from here."""
+        return MoveStoppedError(
+            f"{move.plan.description} was stopped at {self._observer.written(look.position)}",
+            device=self._name,
+            sent=move.sent,
+            received=look.as_sent,
+            hint="command a new move when you want to go on",
+        )
+
+    def stopped_by_others(self, move: Move, look: Look) -> MoveStoppedError:
+        """Report a move that somebody else has stopped."""
+        by = "by input I6" if look.status.stopped_by_input else "by somebody else"
+        return MoveStoppedError(
+            f"{move.plan.description} was stopped {by} at {self._observer.written(look.position)}",
+            device=self._name,
+            sent=move.sent,
+            received=look.as_sent,
+            hint="find out who stopped it before you command it again",
+        )
+
+    def not_arrived(self, move: Move, look: Look) -> MoveTimeoutError:
+        """Report a move after which the drive stands still, elsewhere, and gives no reason."""
+        return MoveTimeoutError(
+            f"{move.plan.description} ended at {self._observer.written(look.position)}, not at its target",
+            device=self._name,
+            sent=move.sent,
+            received=look.as_sent,
+            hint="the drive acknowledged it and stands still; does P20 make it keep quiet about errors?",
+        )
+
+    def stalled(self, move: Move, look: Look, seconds: float) -> MoveTimeoutError:
+        """Report a move whose axis stands still although its command is active."""
+        return MoveTimeoutError(
+            f"{move.plan.description} stood still at {self._observer.written(look.position)} for {seconds:g} s "
+            "with its command active, and was stopped",
+            device=self._name,
+            sent=move.sent,
+            received=look.as_sent,
+            hint="find out what holds the axis; a longer stall_timeout_s waits longer",
+        )
+
+    def out_of_time(self, move: Move, timeout_s: float) -> MoveTimeoutError:
+        """Report a move whose budget is used up."""
+        done = "was stopped" if move.is_on_wire else "was not sent"
+        return MoveTimeoutError(
+            f"{move.plan.description} was not at its target within {timeout_s:g} s and {done}",
+            device=self._name,
+            sent=move.sent,
+            hint="give it more time, or find out what holds it",
+        )
+
+    def fault(self, move: Move, look: Look, error: DeviceError | None) -> DriveFaultError:
+        """Report a move that a fault has ended."""
+        which = f"E{error.code}, {error.meaning}" if error else "the drive does not say which"
+        return DriveFaultError(
+            f"a fault ended {move.plan.description} at {self._observer.written(look.position)}: {which}",
+            device=self._name,
+            sent=move.sent,
+            received=look.as_sent,
+            hint=error.remedy if error else "read error_history(), mend the cause, then quit()",
+            code=error.code if error else None,
+            exchanges=self._observer.line.link.recent(),
+        )
+
+    def in_doubt(self, move: Move, why: str, cause: CompaxError) -> MoveInDoubtError:
+        """Report a move of which nobody can say what became of it."""
+        error = MoveInDoubtError(
+            f"what became of {move.plan.description} is in doubt: {why}",
+            device=self._name,
+            sent=move.sent,
+            received=cause.received,
+            hint="look at the machine, then call reconcile(); until then this drive takes no motion from here",
+            exchanges=self._observer.line.link.recent(),
+        )
+        error.__cause__ = cause
+        return error

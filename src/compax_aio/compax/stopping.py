@@ -1,0 +1,105 @@
+"""Stopping one drive: STOP until it is acknowledged, then looking until the axis stands still."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Final
+
+from ..errors import AnswerTimeoutError, CommandRejectedError, CompaxError, MoveTimeoutError
+from ..link.contract import Lane, TurnOver
+from .observer import Look, Observer
+from .protocol import Acknowledged
+from .settings import DriveSettings
+
+__all__ = ["Stop"]
+
+_PAUSE_S: Final = 0.1
+
+
+class Stop:
+    """
+    One stop of one drive; STOP is queued ahead of everything else when this is made.
+
+    Args:
+        observer: Of the drive.
+        settings: The word for STOP, and how long it may take.
+    """
+
+    def __init__(self, observer: Observer, settings: DriveSettings) -> None:
+        self._observer = observer
+        self._settings = settings
+        self._loop = asyncio.get_running_loop()
+        self._reply = self._send()
+
+    async def carry_through(self) -> Look:
+        """
+        Return when the drive stands still.
+
+        A cancellation takes effect afterwards: an event loop that ends cancels every task, and this one matters most
+        then.
+
+        Raises:
+            AnswerTimeoutError, CommandRejectedError, ConnectionLostError: STOP was not acknowledged.
+            MoveTimeoutError: It was acknowledged, but the drive's command is still active.
+        """
+        cancelled: asyncio.CancelledError | None = None
+        while True:
+            try:
+                await self._until_acknowledged()
+                look = await self._until_standstill()
+                break
+            except asyncio.CancelledError as error:
+                cancelled = error
+                self._reply = self._send()
+        if cancelled is not None:
+            raise cancelled
+        return look
+
+    def _send(self) -> asyncio.Future[TurnOver]:
+        return self._observer.line.exchange(self._settings.dialect.stop, Lane.STOP)
+
+    async def _until_acknowledged(self) -> None:
+        """Repeat STOP until the drive acknowledges it: it does no harm when it comes twice."""
+        give_up_at = self._loop.time() + self._settings.stop_timeout_s
+        while True:
+            try:
+                outcome = await self._reply
+            except AnswerTimeoutError as error:
+                failure: CompaxError = error
+            else:
+                if isinstance(outcome, Acknowledged):
+                    return
+                failure = self._observer.line.error_of(self._settings.dialect.stop, outcome)
+                if isinstance(failure, CommandRejectedError) and await self._has_nothing_to_stop():
+                    return
+            if self._loop.time() >= give_up_at:
+                failure.what = f"STOP was not acknowledged: {failure.what}"
+                failure.hint = (
+                    "the axis may be moving: use the emergency stop; the RS-232 word for STOP is on no page that was "
+                    "available (DriveSettings.dialect), so try it on a bench first"
+                )
+                raise failure
+            await asyncio.sleep(_PAUSE_S)
+            self._reply = self._send()
+
+    async def _has_nothing_to_stop(self) -> bool:
+        status = await self._observer.read_status()
+        return not status.command_active and not status.program_running
+
+    async def _until_standstill(self) -> Look:
+        give_up_at = self._loop.time() + self._settings.standstill_timeout_s
+        while True:
+            look = await self._observer.look()
+            status = look.status
+            if not status.command_active or status.idle_after_stop or not status.no_fault:
+                return look
+            if self._loop.time() >= give_up_at:
+                raise MoveTimeoutError(
+                    f"STOP was acknowledged, but {self._settings.standstill_timeout_s:g} s later the drive's command "
+                    f"is still active, at {self._observer.written(look.position)}",
+                    device=self._observer.line.name,
+                    sent=self._settings.dialect.stop,
+                    received=look.as_sent,
+                    hint="use the emergency stop if it moves; a long stop ramp (P10) wants more standstill_timeout_s",
+                )
+            await asyncio.sleep(_PAUSE_S)
