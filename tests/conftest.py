@@ -1,13 +1,23 @@
-"""Every asynchronous test runs on a virtual clock, unless it is marked ``real_time``."""
+"""
+Every asynchronous test runs on a virtual clock, unless it is marked ``real_time``.
+
+Property tests draw the same examples every time; ``HYPOTHESIS_PROFILE=explore`` draws new ones.
+"""
 
 from __future__ import annotations
 
 import asyncio
+import os
 from collections.abc import Callable, Mapping
 
 import pytest
+from hypothesis import settings
 
 from compax_aio.simulator.clock import VirtualClockLoop
+
+settings.register_profile("repeatable", derandomize=True, deadline=None)
+settings.register_profile("explore", max_examples=2000, deadline=None)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "repeatable"))
 
 
 def pytest_asyncio_loop_factories(

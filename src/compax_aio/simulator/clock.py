@@ -45,9 +45,7 @@ class VirtualClockLoop(asyncio.SelectorEventLoop):
         """Whether a thread is at work, so that time must stand still."""
         return self._threads_at_work > 0
 
-    def run_in_executor(
-        self, executor: Any, func: Callable[[Unpack[_Ts]], Any], *args: *_Ts
-    ) -> asyncio.Future[Any]:
+    def run_in_executor(self, executor: Any, func: Callable[[Unpack[_Ts]], Any], *args: *_Ts) -> asyncio.Future[Any]:
         """Run *func* in a thread; the clock stands still until it has returned."""
         self._threads_at_work += 1
         future = super().run_in_executor(executor, func, *args)

@@ -1,0 +1,143 @@
+"""Three simulated drives on three kinds of line, homed and moved at once, with live positions and a closing table."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager
+from dataclasses import dataclass
+
+from rich import box
+from rich.console import Console, Group
+from rich.live import Live
+from rich.progress import BarColumn, Progress, TaskID, TextColumn
+from rich.table import Table
+from rich.text import Text
+
+import compax_aio
+from compax_aio.compax.settings import DriveSettings
+from compax_aio.simulator.compax import Knobs, SimulatedDrive
+from compax_aio.simulator.server import serve_loopback, serve_pty, serve_tcp
+
+__all__ = ["main", "run"]
+
+_UNIT = "mm"
+_TARGETS = ((240.0, 155.5, -60.0), (80.0, 10.25, 0.0))
+_SPEED_PERCENT = 60
+
+Watcher = Callable[[Group], None]
+
+
+@dataclass(frozen=True)
+class _Round:
+    """One motion of all axes, as confirmed, and where the axes were read to stand after it."""
+
+    motion: str
+    results: dict[str, compax_aio.MoveResult]
+    positions: dict[str, float]
+
+
+def main() -> int:
+    """Run the demonstration; returns the exit code."""
+    console = Console()
+    try:
+        console.print(asyncio.run(run(console)))
+    except KeyboardInterrupt:
+        console.print("Interrupted: STOP went to every drive that moved, and each acknowledged it.")
+        return 130
+    except compax_aio.CompaxError as error:
+        console.print(Text(f"{type(error).__name__}: {error}", style="red"))
+        return 1
+    return 0
+
+
+async def run(console: Console, on_frame: Watcher | None = None) -> Table:
+    """Home and move all three, and return the closing table; *on_frame* sees the live display as it changes."""
+    async with _simulated_drives() as urls, _connected(urls) as group:
+        console.print("Three simulated COMPAX drives at 9600 baud, each on a line of its own:")
+        for axis, url in urls.items():
+            console.print(f"  [bold]{axis}[/]  {url}", highlight=False)
+        results = await _watched(console, "finding machine zero", group.home(), on_frame)
+        rounds = [_Round("home", results, await group.positions())]
+        for x, y, z in _TARGETS:
+            move = group.move_to(x=x, y=y, z=z, speed_percent=_SPEED_PERCENT)
+            results = await _watched(console, f"moving to x {x:g}, y {y:g}, z {z:g}", move, on_frame)
+            rounds.append(_Round("move", results, await group.positions()))
+        return _table(rounds)
+
+
+@asynccontextmanager
+async def _simulated_drives() -> AsyncIterator[dict[str, str]]:
+    """Serve one drive behind a pty, one on TCP and one in memory; yields the URL of each."""
+    x = SimulatedDrive(Knobs(baudrate=9600, machine_zero=-35.0, nominal_speed=150.0), name="x")
+    y = SimulatedDrive(Knobs(baudrate=9600, machine_zero=20.0, nominal_speed=90.0), name="y")
+    z = SimulatedDrive(Knobs(baudrate=9600, machine_zero=12.5, nominal_speed=45.0), name="z")
+    async with AsyncExitStack() as stack:
+        yield {
+            "x": await stack.enter_async_context(serve_pty(x)),
+            "y": await stack.enter_async_context(serve_tcp(y)),
+            "z": await stack.enter_async_context(serve_loopback(z, "z")),
+        }
+
+
+def _connected(urls: Mapping[str, str]) -> AbstractAsyncContextManager[compax_aio.DriveGroup]:
+    return compax_aio.DriveGroup.connect(urls, settings=DriveSettings(unit=_UNIT))
+
+
+async def _watched(
+    console: Console, title: str, move: compax_aio.GroupMove, on_frame: Watcher | None
+) -> dict[str, compax_aio.MoveResult]:
+    """Await *move* under a live display of every axis's position."""
+    bars = Progress(
+        TextColumn("  [bold]{task.description}"),
+        BarColumn(bar_width=40),
+        TextColumn("{task.fields[position]:>9.2f} " + _UNIT),
+        TextColumn("{task.fields[state]}"),
+        console=console,
+        auto_refresh=False,
+    )
+    screen = Group(Text(f"\n{title}"), bars)
+    with Live(screen, console=console, refresh_per_second=20):
+        async with asyncio.TaskGroup() as watchers:
+            for axis, each in move.moves.items():
+                bar = bars.add_task(axis, total=1.0, position=0.0, state="")
+                watchers.create_task(_follow(bars, bar, each, lambda: on_frame(screen) if on_frame else None))
+            return await move
+
+
+async def _follow(bars: Progress, bar: TaskID, move: compax_aio.Move, on_frame: Callable[[], None]) -> None:
+    """Draw one axis as it travels from where it is to its target."""
+    begin: float | None = None
+    async for position in move.positions():
+        begin = position if begin is None else begin
+        target = 0.0 if move.target is None else move.target  # machine zero is 0, unless P1 shifts it
+        way = abs(target - begin)
+        done = 1.0 if way == 0 else min(abs(position - begin) / way, 1.0)
+        bars.update(bar, completed=done, position=position, state="on its way" if not move.done() else "")
+        on_frame()
+    if move.done() and not move.cancelled() and move.exception() is None:
+        bars.update(bar, completed=1.0, state=f"[green]reached, by {move.result().confirmed_by}")
+
+
+def _table(rounds: Sequence[_Round]) -> Table:
+    table = Table(title="\nWhat the drives confirmed", title_justify="left", box=box.SIMPLE_HEAD)
+    for heading in ("axis", "motion", "target", "reached", "confirmed by", "time"):
+        table.add_column(heading, justify="right" if heading in ("target", "reached", "time") else "left")
+    for axis in rounds[0].results:
+        for each in rounds:
+            result = each.results[axis]
+            table.add_row(
+                axis if each is rounds[0] else "",
+                each.motion,
+                "machine zero" if result.target is None else f"{result.target:.2f} {_UNIT}",
+                f"{each.positions[axis]:.2f} {_UNIT}",
+                result.confirmed_by,
+                f"{result.duration_s:.2f} s",
+                end_section=each is rounds[-1],
+            )
+    return table
+
+
+if __name__ == "__main__":
+    sys.exit(main())

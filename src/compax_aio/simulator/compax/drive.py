@@ -1,0 +1,372 @@
+"""A simulated COMPAX: bytes and time in, bytes out; one line at a time, messages between answers, faults on demand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from enum import Enum, auto
+from typing import Final
+
+from compax_aio.compax.facts.line import COMMAND_END
+
+from ..line import Host
+from . import replies
+from .knobs import Knobs
+from .language import ExecuteStored, MoveBy, MoveHome, MoveTo, Query, Start, Statement, parse
+from .log import Log, LogKind
+from .machine import Machine, Message, MessageKind
+from .port import ReceivedLine, SerialPort
+from .readings import reading
+from .refusals import STORE_EMPTY, SYNTAX, RefusedError
+
+__all__ = ["SimulatedDrive"]
+
+_LAST_CODE: Final = 97
+"""98 and 99 are marks of the error history, and a code there has two digits (UG p. 209)."""
+
+
+class _Turn(Enum):
+    """Where the drive is in answering a line."""
+
+    READY = auto()
+    """For the next line."""
+    PREPARING = auto()
+    """A line has come; it is executed when the time for that is over."""
+    HOLDING = auto()
+    """The line has been executed; its answer has not begun."""
+    SENDING = auto()
+    """The answer is on the wire."""
+
+
+class SimulatedDrive:
+    """
+    One COMPAX and its axis; does no I/O.
+
+    Times are seconds on any one clock. Time goes forward in steps of any size with the same result; a time that lies
+    behind the last one counts as that. Where *now* may be left out, it is the time of whoever serves this drive, or
+    the last time it was told.
+
+    Args:
+        knobs: Behaviour and mechanics.
+        name: For messages and tests.
+
+    Attributes:
+        log: What the drive has done, oldest first.
+        silent: Fault hook: everything is executed, nothing is sent.
+        deaf: Fault hook: nothing that arrives is received.
+        lose_answers: Fault hook: so many answers or messages are still kept from the wire.
+        lose_position_reached: Fault hook: so many ``$`` messages are still kept from the wire.
+        served_by: Who gives this drive the time and carries its bytes; None where a test does that itself.
+        delay_position_reached_s: Fault hook: ``$`` is sent so much later than it should be.
+    """
+
+    def __init__(self, knobs: Knobs | None = None, *, name: str = "drive") -> None:
+        self.knobs = knobs or Knobs()
+        self.name = name
+        self.log = Log()
+        self.silent = False
+        self.deaf = False
+        self.lose_answers = 0
+        self.lose_position_reached = 0
+        self.delay_position_reached_s = 0.0
+        self._extra_answer_delay_s = 0.0
+        self._now = 0.0
+        self.served_by: Host | None = None
+        self._machine = Machine(self.knobs, self.log)
+        self._port = SerialPort(self.knobs)
+        self._powered = True
+        self._forget_conversation()
+
+    def __repr__(self) -> str:
+        return f"<SimulatedDrive {self.name!r} at {self.position:g} {self.knobs.unit}>"
+
+    # The line
+
+    def receive(self, data: bytes, now: float) -> None:
+        """Take bytes that the host sends at time *now*."""
+        self.advance(now)
+        if self._powered and not self.deaf:
+            self._port.receive(data, self._now)
+            self._after_departure()
+            self._take_line()
+            self._run(self._now)
+
+    def advance(self, now: float) -> None:
+        """Let everything happen that is due until *now*."""
+        self._run(now)
+
+    def take_output(self, now: float) -> bytes:
+        """Return the bytes that have come out by *now* and were not taken yet."""
+        self._run(now)
+        return self._port.take()
+
+    def next_event_at(self) -> float | None:
+        """Return when something happens by itself next; None if nothing will, unless bytes come."""
+        event = self._next_event()
+        return None if event is None else max(event[0], self._now)
+
+    def connect(self, now: float | None = None) -> None:
+        """Note that somebody is on the line; what came out while nobody was there is gone."""
+        self._run(self._time(now))
+        self._port.take()
+        self.log.add(self._now, LogKind.CONNECTED)
+
+    def disconnect(self, now: float | None = None) -> None:
+        """Note that nobody is on the line; entry buffer, position and everything else stay as they are."""
+        self._run(self._time(now))
+        self.log.add(self._now, LogKind.DISCONNECTED)
+
+    # What tests look at
+
+    @property
+    def position(self) -> float:
+        """Where the axis is now."""
+        self._run(self._time(None))
+        return self._machine.axis.position(self._now)
+
+    @property
+    def moving(self) -> bool:
+        """Whether a positioning runs now."""
+        self._run(self._time(None))
+        return self._machine.moving
+
+    @property
+    def homed(self) -> bool:
+        """Whether machine zero has been found."""
+        self._run(self._time(None))
+        return self._machine.homed
+
+    @property
+    def outputs(self) -> Mapping[int, bool]:
+        """O1-O16 as they are now."""
+        self._run(self._time(None))
+        return dict(self._machine.outputs)
+
+    @property
+    def fault(self) -> int | None:
+        """The fault or warning that is present, as S30 tells it."""
+        return self._machine.faults.present
+
+    @property
+    def prepared_points(self) -> int:
+        """How many speed steps and comparators wait for the next positioning."""
+        return self._machine.prepared_points
+
+    # What tests do to it
+
+    @property
+    def extra_answer_delay_s(self) -> float:
+        """Fault hook: answers that have not begun yet begin so much later; their lines are executed in time."""
+        return self._extra_answer_delay_s
+
+    @extra_answer_delay_s.setter
+    def extra_answer_delay_s(self, seconds: float) -> None:
+        self._run(self._time(None))
+        self._extra_answer_delay_s = seconds
+        self._changed()
+
+    def raise_fault(self, code: int, now: float | None = None) -> None:
+        """Let fault E1-E57 stop the axis, or let a warning (E58-E97) come."""
+        if not 1 <= code <= _LAST_CODE:
+            raise ValueError(f"a fault code is 1 to {_LAST_CODE}, not {code}")
+        self._run(self._time(now))
+        self._machine.raise_fault(code, self._now)
+        self._changed()
+
+    def power_off(self, now: float | None = None) -> None:
+        """Take the power away; until it is back nothing is received, sent or moved."""
+        self._run(self._time(now))
+        self._powered = False
+        self._port.reset()
+        self._forget_conversation()
+        self._machine.power_off(self._now)
+        self._changed()
+
+    def power_on(self, now: float | None = None) -> None:
+        """Give the power back."""
+        self._run(self._time(now))
+        self._powered = True
+        self._machine.power_on(self._now)
+        if not self.silent:
+            self._port.send(replies.power_on_text(self.knobs), self._now)
+        self._changed()
+
+    def power_cycle(self, now: float | None = None) -> None:
+        """Take the power away and give it back at once."""
+        self.power_off(now)
+        self.power_on(now)
+
+    def inject(self, data: bytes, now: float | None = None) -> None:
+        """Put noise on the line to the host."""
+        self._run(self._time(now))
+        self._port.inject(data)
+        self._changed()
+
+    # Time
+
+    def _time(self, now: float | None) -> float:
+        if now is not None:
+            return now
+        return self._now if self.served_by is None else self.served_by.time()
+
+    def _changed(self) -> None:
+        if self.served_by is not None:
+            self.served_by.changed()
+
+    def _run(self, now: float) -> None:
+        while (event := self._next_event()) is not None and event[0] <= now:
+            self._now = max(self._now, event[0])
+            event[1]()
+        self._now = max(self._now, now)
+
+    def _next_event(self) -> tuple[float, Callable[[], None]] | None:
+        """Find what happens next; of events at the same time the first of this list."""
+        first: tuple[float, Callable[[], None]] | None = None
+        for at, event in (
+            (self._machine.next_event_at(), self._machine_event),
+            (self._port.next_event_at(), self._port_event),
+            (self._turn_ends_at(), self._turn_event),
+            (self._delayed[0][0] if self._delayed else None, self._delayed_event),
+        ):
+            if at is not None and (first is None or at < first[0]):
+                first = at, event
+        return first
+
+    def _turn_ends_at(self) -> float | None:
+        if self._turn is _Turn.PREPARING:
+            return self._prepared_at
+        if self._turn is _Turn.HOLDING:
+            return self._prepared_at + self._extra_answer_delay_s
+        return None
+
+    def _machine_event(self) -> None:
+        what = self._machine.step(self._now)
+        if what is None:
+            return
+        if what.kind is MessageKind.POSITION_REACHED and self.delay_position_reached_s > 0:
+            self._delayed.append((self._now + self.delay_position_reached_s, what))
+            self._delayed.sort(key=lambda due: due[0])
+        else:
+            self._say(what)
+
+    def _delayed_event(self) -> None:
+        self._say(self._delayed.pop(0)[1])
+
+    def _port_event(self) -> None:
+        self._port.step(self._now)
+        self._after_departure()
+        self._take_line()
+
+    # One line after the other
+
+    def _forget_conversation(self) -> None:
+        self._turn = _Turn.READY
+        self._prepared_at = 0.0
+        self._line = ReceivedLine("", too_long=False)
+        self._answer: str | None = None
+        self._answer_mark = 0
+        self._answer_is_of_motion = False
+        self._behind_answer: list[Message] = []
+        self._delayed: list[tuple[float, Message]] = []
+        self._stored: Statement | None = None
+
+    def _take_line(self) -> None:
+        if self._turn is not _Turn.READY:
+            return
+        line = self._port.next_line()
+        if line is None:
+            return
+        self._line = line
+        self._prepared_at = self._now + self.knobs.answer_time_s
+        self._turn = _Turn.PREPARING
+        self.log.add(self._now, LogKind.LINE, line.text)
+        if self.knobs.echo and not self.silent:
+            self._port.send(line.text.encode("latin-1") + COMMAND_END, self._now)
+
+    def _turn_event(self) -> None:
+        if self._turn is _Turn.PREPARING:
+            self._execute_line()
+            self._turn = _Turn.HOLDING
+        else:
+            self._send_answer()
+
+    def _send_answer(self) -> None:
+        """Put the answer on the wire, and behind it what has waited for it."""
+        self._answer_mark = 0
+        if self._answer is not None and not self._is_lost(self._answer):
+            self.log.add(self._now, LogKind.ANSWER, self._answer)
+            self._answer_mark = self._port.send(replies.answer(self._answer), self._now)
+        self._turn = _Turn.SENDING
+        waiting, self._behind_answer = self._behind_answer, []
+        for what in waiting:
+            self._say(what)
+        self._after_departure()
+        self._take_line()
+
+    def _after_departure(self) -> None:
+        if self._turn is _Turn.SENDING and self._port.has_departed(self._answer_mark):
+            self._turn = _Turn.READY
+            self._port.make_room()
+
+    def _say(self, what: Message) -> None:
+        """Send a message, but never what a motion does before the answer to the command that began it."""
+        if self._turn is _Turn.HOLDING and self._answer_is_of_motion:
+            self._behind_answer.append(what)
+            return
+        if what.kind is MessageKind.POSITION_REACHED and self.lose_position_reached > 0:
+            self.lose_position_reached -= 1
+            self.log.add(self._now, LogKind.LOST, what.text)
+        elif not self._is_lost(what.text):
+            self.log.add(self._now, LogKind.MESSAGE, what.text)
+            self._port.send(replies.message(what, self.knobs), self._now)
+
+    def _is_lost(self, text: str) -> bool:
+        """Take an answer or message for a fault hook, if one wants it."""
+        if not self.silent:
+            if self.lose_answers <= 0:
+                return False
+            self.lose_answers -= 1
+        self.log.add(self._now, LogKind.LOST, text)
+        return True
+
+    # What a line means
+
+    def _execute_line(self) -> None:
+        self._answer_is_of_motion = False
+        try:
+            self._answer = self._respond(self._line)
+        except RefusedError as refused:
+            self._answer = replies.error_text(refused.refusal, self.knobs)
+
+    def _respond(self, line: ReceivedLine) -> str | None:
+        """Carry out a line; return the answer, None for none."""
+        stored = self._stored
+        if self.knobs.store == "until_next_line":
+            self._stored = None
+        if line.too_long:
+            raise RefusedError(SYNTAX)
+        text = line.text.upper() if self.knobs.lower_case == "folded" else line.text
+        statement = parse(text, decimals=self.knobs.decimals)
+        if statement.stores:
+            self._stored = statement
+            return line.text if statement.echoes else ""
+        if isinstance(statement.instruction, ExecuteStored):
+            if stored is None:
+                raise RefusedError(STORE_EMPTY)
+            self._stored = None
+            statement = stored
+        if not statement.echoes:
+            return self._carry_out(statement)
+        # Whether an echoed line also answers is open (row 11): here the echo is the answer, unless it is refused.
+        if self.knobs.echo_sign == "echo_and_execute":
+            self._carry_out(statement)
+        return line.text
+
+    def _carry_out(self, statement: Statement) -> str | None:
+        instruction = statement.instruction
+        if isinstance(instruction, Query):
+            return reading(self._machine, instruction.kind, instruction.number, self._now)
+        self._machine.execute(instruction, statement.reports, self._now)
+        self._answer_is_of_motion = isinstance(instruction, MoveTo | MoveBy | MoveHome | Start)
+        if statement.reports and self.knobs.position_reached == "final_only":
+            return None
+        return ""

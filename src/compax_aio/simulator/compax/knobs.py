@@ -1,0 +1,172 @@
+"""What can be set on a simulated drive: every ambiguity of the manuals, the mechanics, and the line's speed."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+import typing
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, Self
+
+from compax_aio.compax.facts.limits import MAX_ACCELERATION_TIME_MS, MAX_POSITION, MAX_SPEED_PERCENT
+from compax_aio.errors import TransportError
+
+__all__ = ["Knobs"]
+
+
+@dataclass(frozen=True, slots=True)
+class _Range:
+    low: float
+    high: float
+
+    def __str__(self) -> str:
+        return f"{self.low:g} to {self.high:g}"
+
+
+_Position = Annotated[float, _Range(-MAX_POSITION, MAX_POSITION)]
+_Seconds = Annotated[float, _Range(0, 3600)]
+_RampTime = Annotated[int, _Range(0, MAX_ACCELERATION_TIME_MS)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Knobs:
+    """
+    How one simulated drive behaves where the manuals leave it open, and what it moves.
+
+    "Row" is the row of the table in section 14 of the project's fact sheet, whose first option is the default.
+
+    Raises:
+        TransportError: A value is not possible; says which are.
+    """
+
+    # How it answers
+
+    error_style: Literal["code", "text", "prompt_only", "silent"] = "code"
+    """Rows 1 and 2: ``E92`` and prompt; ``E92 command active`` and prompt; a bare prompt; nothing at all."""
+    position_reached: Literal["prompt_first", "final_only"] = "prompt_first"
+    """Row 3: an accepted ``$`` command gets its prompt and later ``$``; or nothing but the final ``$``."""
+    position_reached_on_stop: bool = False
+    """Row 12: ``$`` is sent also when STOP, BREAK or a fault ended the move (then once, not again after START)."""
+    position_reached_on_home: bool = True
+    """Row 12: ``POSA HOME$`` sends ``$``; if not, it is accepted and sends none."""
+    comparator_messages: Literal["always", "with_sign"] = "always"
+    """Row 4: comparators send their number in every move, or only in one that carried ``$``."""
+    comparator_form: Literal["number_first", "prompt_first"] = "number_first"
+    """Row 5: ``n CR LF >`` or ``CR LF > n``."""
+    comparator_numbering: Literal["comparators", "points"] = "comparators"
+    """The number counts comparators alone, or all prepared points, speed steps too (UG p. 162 leaves it open)."""
+    reply_padding: Literal["none", "blanks", "unit"] = "none"
+    """Row 7: ``S001: 123.45``; right-aligned between blanks; followed by the unit."""
+    decimals: Literal[2, 3] = 2
+    """Row 8: of positions and distances, in and out (UG p. 100); ``unit=inch`` in a query means 3 unless it says."""
+    status_bits_blank: bool = False
+    """Row 9: S16 and S17 as ``1101 0000``."""
+    fault_numbers: Literal["two", "one"] = "two"
+    """Row 10: S30 is ``55 0`` or ``55``."""
+    echo_sign: Literal["echo_and_execute", "echo_only"] = "echo_and_execute"
+    """Row 11: what ``?`` does besides sending back what was received."""
+    store: Literal["until_executed", "until_next_line"] = "until_executed"
+    """How long ``,`` keeps an instruction: until ``!`` took it, or at most until any other line."""
+    long_line: Literal["error", "truncate"] = "error"
+    """Row 17: more than 30 characters are refused, or cut."""
+    echo: bool = False
+    """Row 18: a received line comes back with its CR before it is answered."""
+    power_on_text: Literal["nothing", "prompt", "banner"] = "nothing"
+    """Row 19."""
+    lower_case: Literal["folded", "error"] = "folded"
+    """Row 20."""
+    ready_after_answer: bool = False
+    """A command is received only after the last answer is out (UG p. 160): bytes before that are lost, not kept."""
+    xonxoff: bool = False
+    """P20 bit 0: Xoff from the host holds the output. Without it Xon and Xoff are characters like others."""
+
+    # The line and the processor
+
+    baudrate: Literal[0, 9600, 4800] = 0
+    """Byte timing of both directions, ten bits a byte; 0: bytes take no time."""
+    answer_time_s: _Seconds = 0.002
+    """From the CR of a line to its execution and the first byte of its answer (unknown; section 11)."""
+    self_test_s: _Seconds = 0.0
+    """After power-on, S16 bit 1 stays 0 and positioning is refused for so long (UG p. 209; the time is unknown)."""
+
+    # The axis
+
+    unit: Literal["mm", "inch", "degree", "increments"] = "mm"
+    """P90: what positions are counted in."""
+    nominal_speed: Annotated[float, _Range(0.001, 1e9)] = 200.0
+    """Units per second at SPEED 100."""
+    speed_percent: Annotated[float, _Range(0.001, MAX_SPEED_PERCENT)] = 100.0
+    """P2: the speed from power-on until SPEED says another."""
+    acceleration_ms: _RampTime = 250
+    """P6: the time from standstill to nominal speed, from power-on until ACCEL says another."""
+    stop_ramp_ms: _RampTime = 100
+    """P10: the time from nominal speed to standstill for STOP, BREAK and faults."""
+    position: _Position = 0.0
+    """What S1 reads at the beginning."""
+    machine_zero: _Position = 0.0
+    """Where machine zero lies, as a distance from the position at the beginning; meaningless if ``homed``."""
+    homed: bool = False
+    """Machine zero has been found, so that it lies at position 0."""
+    travel_min: _Position = -MAX_POSITION
+    """P12: targets below it are refused."""
+    travel_max: _Position = MAX_POSITION
+    """P11: targets above it are refused."""
+    following_error_factor: Annotated[float, _Range(0, 1)] = 0.001
+    """Following error in units for each unit per second: the time in s by which the axis lags behind."""
+
+    def __post_init__(self) -> None:
+        for key, (_, allows, allowed) in _fields().items():
+            value = getattr(self, key)
+            if not allows(value):
+                raise _impossible(key, value, allowed)
+        if self.travel_min >= self.travel_max:
+            raise _impossible("travel_min", self.travel_min, f"less than travel_max, {self.travel_max:g}")
+
+    @classmethod
+    def from_query(cls, query: Mapping[str, str]) -> Self:
+        """
+        Read knobs from the query of a URL: ``{"echo": "1", "decimals": "3"}``.
+
+        Raises:
+            TransportError: No knob has that name, or it cannot be set to that value; names those that are possible.
+        """
+        values: dict[str, Any] = {"decimals": 3} if query.get("unit") == "inch" else {}
+        for key, text in query.items():
+            if key not in _fields():
+                raise TransportError(
+                    f"a simulated COMPAX has no knob {key!r} (={text!r})", hint=f"its knobs are {', '.join(_fields())}"
+                )
+            read, _, allowed = _fields()[key]
+            try:
+                values[key] = read(text)
+            except (KeyError, ValueError):
+                raise _impossible(key, text, allowed) from None
+        return cls(**values)
+
+
+def _impossible(key: str, value: object, allowed: str) -> TransportError:
+    return TransportError(f"a simulated COMPAX cannot have {key}={value!r}", hint=f"allowed: {allowed}")
+
+
+_Field = tuple[Callable[[str], Any], Callable[[Any], bool], str]
+
+
+@functools.cache
+def _fields() -> Mapping[str, _Field]:
+    """Say of each knob how its text is read, which values it takes, and how to tell the user."""
+    hints = typing.get_type_hints(Knobs, include_extras=True)
+    return {field.name: _field(hints[field.name]) for field in dataclasses.fields(Knobs)}
+
+
+def _field(hint: Any) -> _Field:
+    if typing.get_origin(hint) is Annotated:
+        kind, limits = typing.get_args(hint)
+        return kind, functools.partial(_is_within, limits), str(limits)
+    values = {"0": False, "1": True} if hint is bool else {str(value): value for value in typing.get_args(hint)}
+    return values.__getitem__, list(values.values()).__contains__, ", ".join(values)
+
+
+def _is_within(limits: _Range, value: float) -> bool:
+    return math.isfinite(value) and limits.low <= value <= limits.high

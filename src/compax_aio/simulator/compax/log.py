@@ -1,0 +1,72 @@
+"""What a simulated drive has done, for tests to read: the far end's own testimony."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final
+
+__all__ = ["Log", "LogEntry", "LogKind"]
+
+_MAX_ENTRIES: Final = 20_000
+
+
+class LogKind(StrEnum):
+    """What a log entry tells of, and how its text is formed."""
+
+    LINE = "line"
+    """A complete line is being processed; the text as received, without CR."""
+    ANSWER = "answer"
+    """An answer begins on the wire; its text without prompt."""
+    MESSAGE = "message"
+    """A message begins on the wire: ``$`` or a comparator's number."""
+    LOST = "lost"
+    """An answer or message that a fault hook kept from the wire; its text."""
+    MOTION_STARTED = "motion_started"
+    """A positioning began; command word and target: ``POSA 100.00``."""
+    MOTION_CONTINUED = "motion_continued"
+    """START continued a stopped positioning; command word and target."""
+    MOTION_REACHED = "motion_reached"
+    """The axis stands at its target; the position."""
+    MOTION_STOPPED = "motion_stopped"
+    """The axis stands after STOP or BREAK; the position."""
+    MOTION_FAULT = "motion_fault"
+    """The axis stands after a fault or without power; the position."""
+    OUTPUT = "output"
+    """An output was set: ``O9=1``."""
+    FAULT = "fault"
+    """A fault or warning came: ``E55``."""
+    QUIT = "quit"
+    """The fault was acknowledged."""
+    POWER = "power"
+    """``off`` or ``on``."""
+    CONNECTED = "connected"
+    """Somebody is on the line."""
+    DISCONNECTED = "disconnected"
+    """Nobody is on the line any more."""
+
+
+@dataclass(frozen=True, slots=True)
+class LogEntry:
+    """One thing that the drive did."""
+
+    at: float
+    """Time in seconds, on the clock that the drive is given."""
+    kind: LogKind
+    text: str
+
+
+class Log(deque[LogEntry]):
+    """The last things that happened, oldest first; old ones fall off at the end."""
+
+    def __init__(self) -> None:
+        super().__init__(maxlen=_MAX_ENTRIES)
+
+    def add(self, at: float, kind: LogKind, text: str = "") -> None:
+        """Append an entry."""
+        self.append(LogEntry(at, kind, text))
+
+    def texts(self, *kinds: LogKind) -> list[str]:
+        """List the texts of all entries of *kinds*, oldest first."""
+        return [entry.text for entry in self if entry.kind in kinds]

@@ -1,0 +1,151 @@
+"""The drive's serial port: entry buffer, byte times, Xon and Xoff. It outlives every connection, as a real one does."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from typing import Final
+
+from compax_aio.compax.facts.line import COMMAND_END, MAX_LINE_LENGTH, XOFF, XON
+
+from .knobs import Knobs
+
+__all__ = ["ReceivedLine", "SerialPort"]
+
+_CR: Final = COMMAND_END[0]
+_LF: Final = 0x0A
+_BITS_A_BYTE: Final = 10
+"""8 data bits, start and stop (UG p. 160)."""
+_MAX_WAITING: Final = 65_536
+"""Bytes kept in any one direction; more are lost, so that memory is bounded."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReceivedLine:
+    """What stood in the entry buffer when CR came."""
+
+    text: str
+    too_long: bool
+
+
+class SerialPort:
+    """Bytes from and to the host, with the time each takes."""
+
+    def __init__(self, knobs: Knobs) -> None:
+        self._byte_time_s = _BITS_A_BYTE / knobs.baudrate if knobs.baudrate else 0.0
+        self._xonxoff = knobs.xonxoff
+        self._truncates = knobs.long_line == "truncate"
+        self._one_line = knobs.ready_after_answer
+        self.reset()
+        self._left = bytearray()
+
+    def reset(self) -> None:
+        """Forget everything, as without power; what has left has left."""
+        self._entry = bytearray()
+        self._too_long = False
+        self._full = False
+        self._received: deque[int] = deque(maxlen=_MAX_WAITING)
+        self._arriving: deque[tuple[float, int]] = deque()
+        self._input_free_at = 0.0
+        self._waiting = bytearray()
+        self._departs_at: float | None = None
+        self._held = False
+        self._queued = self._departed = 0
+
+    # From the host
+
+    def receive(self, data: bytes, now: float) -> None:
+        """Take bytes that the host begins to send now."""
+        if not self._byte_time_s:
+            for byte in data:
+                self._arrived(byte, now)
+            return
+        for byte in data[: _MAX_WAITING - len(self._arriving)]:
+            self._input_free_at = max(self._input_free_at, now) + self._byte_time_s
+            self._arriving.append((self._input_free_at, byte))
+
+    def next_line(self) -> ReceivedLine | None:
+        """Take bytes into the entry buffer until CR completes a line; half a line stays there until its CR comes."""
+        while self._received:
+            byte = self._received.popleft()
+            if byte == _CR:
+                line = ReceivedLine(self._entry.decode("latin-1"), self._too_long and not self._truncates)
+                self._entry.clear()
+                self._too_long = False
+                return line
+            if byte == _LF:
+                continue
+            if len(self._entry) < MAX_LINE_LENGTH:
+                self._entry.append(byte)
+            else:
+                self._too_long = True
+        return None
+
+    def make_room(self) -> None:
+        """Receive again, after a line has been answered; matters only to a drive that takes one line at a time."""
+        self._full = False
+
+    def _arrived(self, byte: int, now: float) -> None:
+        if self._xonxoff and byte in {XON, XOFF}:
+            self._held = byte == XOFF
+            self._depart(now)
+        elif not self._full:
+            self._received.append(byte)
+            self._full = self._one_line and byte == _CR
+
+    # To the host
+
+    def send(self, data: bytes, now: float) -> int:
+        """Put bytes behind those that wait; return a mark for :meth:`has_departed`."""
+        accepted = data[: _MAX_WAITING - len(self._waiting)]
+        self._waiting += accepted
+        self._queued += len(accepted)
+        self._depart(now)
+        return self._queued
+
+    def has_departed(self, mark: int) -> bool:
+        """Whether all bytes up to *mark* are on their way."""
+        return self._departed >= mark
+
+    def inject(self, data: bytes | bytearray) -> None:
+        """Put noise on the line at once, even into the middle of an answer."""
+        self._left += data
+        del self._left[:-_MAX_WAITING]
+
+    def take(self) -> bytes:
+        """Return the bytes that have come out since the last call."""
+        data = bytes(self._left)
+        self._left.clear()
+        return data
+
+    def _depart(self, now: float) -> None:
+        """Let bytes go, all at once or one after the other."""
+        if self._held or not self._waiting or self._departs_at is not None:
+            return
+        if self._byte_time_s:
+            self._departs_at = now + self._byte_time_s
+            return
+        self._departed += len(self._waiting)
+        self.inject(self._waiting)
+        self._waiting.clear()
+
+    # Time
+
+    def next_event_at(self) -> float | None:
+        """Return when the next byte has arrived or departed."""
+        if not self._arriving:
+            return self._departs_at
+        arrives_at = self._arriving[0][0]
+        return arrives_at if self._departs_at is None else min(arrives_at, self._departs_at)
+
+    def step(self, now: float) -> None:
+        """Let the next byte, which must be due, arrive or depart."""
+        if self._arriving and self._arriving[0][0] <= now:
+            self._arrived(self._arriving.popleft()[1], now)
+            return
+        # A byte under way is finished even after Xoff.
+        self.inject(self._waiting[:1])
+        del self._waiting[:1]
+        self._departed += 1
+        self._departs_at = None
+        self._depart(now)

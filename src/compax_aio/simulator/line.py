@@ -1,0 +1,176 @@
+"""The line to a simulated device: gives it the event loop's time, wakes it, and hands bytes to who is connected."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Protocol
+
+from compax_aio.errors import TransportError
+
+__all__ = ["Connection", "DeviceLine", "Host", "SimulatedDevice"]
+
+
+class Host(Protocol):
+    """Who serves a simulated device."""
+
+    def time(self) -> float:
+        """Return the time now."""
+
+    def changed(self) -> None:
+        """Take note that the device may have output, or wants to be woken at another time."""
+
+
+class SimulatedDevice(Protocol):
+    """What a simulated device must have to be served: bytes and time in, bytes out."""
+
+    name: str
+    served_by: Host | None
+
+    def receive(self, data: bytes, now: float) -> None:
+        """Take bytes that arrive at *now*."""
+
+    def take_output(self, now: float) -> bytes:
+        """Let everything happen until *now*, and return what has come out."""
+
+    def next_event_at(self) -> float | None:
+        """Return when something happens by itself next."""
+
+    def connect(self, now: float | None = None) -> None:
+        """Take note that somebody is on the line."""
+
+    def disconnect(self, now: float | None = None) -> None:
+        """Take note that nobody is on the line."""
+
+
+class DeviceLine:
+    """
+    The one line of a device in one event loop; it exists whether somebody is connected or not.
+
+    A device goes on living while nobody is connected; what it sends then goes nowhere.
+    """
+
+    def __init__(self, device: SimulatedDevice, loop: asyncio.AbstractEventLoop) -> None:
+        self._device = device
+        self._loop = loop
+        self._write: Callable[[bytes], None] | None = None
+        self._timer: asyncio.TimerHandle | None = None
+        device.served_by = self
+
+    @classmethod
+    def of(cls, device: SimulatedDevice) -> DeviceLine:
+        """Return the line of *device* in the running event loop, which is always the same one."""
+        loop = asyncio.get_running_loop()
+        line = device.served_by
+        if isinstance(line, DeviceLine) and line._loop is loop:  # noqa: SLF001  # of this class
+            return line
+        return cls(device, loop)
+
+    @property
+    def occupied(self) -> bool:
+        """Whether somebody is connected."""
+        return self._write is not None
+
+    def connect(self, write: Callable[[bytes], None]) -> None:
+        """
+        Connect somebody who is sent bytes by *write*.
+
+        Raises:
+            TransportError: Somebody else is connected.
+        """
+        if self.occupied:
+            raise TransportError(
+                f"somebody else is connected to the simulated device {self._device.name!r}",
+                hint="close that connection first; a serial line has two ends",
+            )
+        self._device.connect(self._loop.time())
+        self._write = write
+        self.changed()
+
+    def receive(self, data: bytes) -> None:
+        """Take bytes from who is connected."""
+        self._device.receive(data, self._loop.time())
+        self.changed()
+
+    def disconnect(self) -> None:
+        """Let go of who was connected."""
+        self._write = None
+        self._device.disconnect(self._loop.time())
+
+    def time(self) -> float:
+        """Return the time of the event loop."""
+        return self._loop.time()
+
+    def changed(self) -> None:
+        """Hand on what has come out, and wake the device in time for what comes next."""
+        self._pass_on(self._loop.time())
+
+    def _pass_on(self, now: float) -> None:
+        output = self._device.take_output(now)
+        at = self._device.next_event_at()
+        if self._timer is not None and self._timer.when() != at:
+            self._timer.cancel()
+            self._timer = None
+        if self._timer is None and at is not None and not self._loop.is_closed():
+            self._timer = self._loop.call_at(at, self._wake, at)
+        if output and self._write is not None:
+            self._write(output)
+
+    def _wake(self, at: float) -> None:
+        self._timer = None
+        # Event loops may call a little early; for the device it is the time it asked for.
+        self._pass_on(max(at, self._loop.time()))
+
+
+class Connection(asyncio.Protocol):
+    """
+    The device's end of one connection, TCP or in memory.
+
+    While another connection holds the line, a new one is hung up at once, as most terminal servers do. Bytes for a
+    host that does not read are lost after its buffers are full, as on a serial line without handshake.
+    """
+
+    def __init__(self, line: DeviceLine, connections: set[Connection]) -> None:
+        self._line = line
+        self._connections = connections
+        self._transport: asyncio.Transport | None = None
+        self._overrun = False
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Take the line, or hang up if it is taken."""
+        assert isinstance(transport, asyncio.Transport)
+        if self._line.occupied:
+            transport.abort()
+            return
+        self._transport = transport
+        self._connections.add(self)
+        self._line.connect(self._send)
+
+    def data_received(self, data: bytes) -> None:
+        """Hand bytes to the device."""
+        if self._transport is not None:
+            self._line.receive(data)
+
+    def connection_lost(self, _: Exception | None) -> None:
+        """Give the line back."""
+        if self._transport is not None:
+            self._transport = None
+            self._connections.discard(self)
+            self._line.disconnect()
+
+    def pause_writing(self) -> None:
+        """Lose bytes from now on."""
+        self._overrun = True
+
+    def resume_writing(self) -> None:
+        """Send again."""
+        self._overrun = False
+
+    def abort(self) -> None:
+        """Hang up."""
+        if self._transport is not None:
+            self._transport.abort()
+
+    def _send(self, data: bytes) -> None:
+        if self._transport is not None and not self._overrun:
+            self._transport.write(data)
