@@ -7,6 +7,7 @@ import sys
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass
+from typing import Literal
 
 from rich import box
 from rich.console import Console, Group
@@ -25,6 +26,7 @@ __all__ = ["main", "run"]
 _UNIT = "mm"
 _TARGETS = ((240.0, 155.5, -60.0), (80.0, 10.25, 0.0))
 _SPEED_PERCENT = 60
+_BAUDRATE: Literal[0, 9600] = 9600
 
 Watcher = Callable[[Group], None]
 
@@ -55,7 +57,7 @@ def main() -> int:
 async def run(console: Console, on_frame: Watcher | None = None) -> Table:
     """Home and move all three, and return the closing table; *on_frame* sees the live display as it changes."""
     async with _simulated_drives() as urls, _connected(urls) as group:
-        console.print("Three simulated COMPAX drives at 9600 baud, each on a line of its own:")
+        console.print("Three simulated COMPAX drives, each on a line of its own:")
         for axis, url in urls.items():
             console.print(f"  [bold]{axis}[/]  {url}", highlight=False)
         results = await _watched(console, "finding machine zero", group.home(), on_frame)
@@ -70,9 +72,9 @@ async def run(console: Console, on_frame: Watcher | None = None) -> Table:
 @asynccontextmanager
 async def _simulated_drives() -> AsyncIterator[dict[str, str]]:
     """Serve one drive behind a pty, one on TCP and one in memory; yields the URL of each."""
-    x = SimulatedDrive(Knobs(baudrate=9600, machine_zero=-35.0, nominal_speed=150.0), name="x")
-    y = SimulatedDrive(Knobs(baudrate=9600, machine_zero=20.0, nominal_speed=90.0), name="y")
-    z = SimulatedDrive(Knobs(baudrate=9600, machine_zero=12.5, nominal_speed=45.0), name="z")
+    x = SimulatedDrive(Knobs(baudrate=_BAUDRATE, machine_zero=-35.0, nominal_speed=150.0), name="x")
+    y = SimulatedDrive(Knobs(baudrate=_BAUDRATE, machine_zero=20.0, nominal_speed=90.0), name="y")
+    z = SimulatedDrive(Knobs(baudrate=_BAUDRATE, machine_zero=12.5, nominal_speed=45.0), name="z")
     async with AsyncExitStack() as stack:
         yield {
             "x": await stack.enter_async_context(serve_pty(x)),
