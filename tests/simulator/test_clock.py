@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import socket
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -29,6 +30,26 @@ async def test_the_clock_stands_still_while_a_thread_works() -> None:
     async with asyncio.timeout(0.001):
         await asyncio.to_thread(time.sleep, 0.02)
     assert asyncio.get_running_loop().time() == 0
+
+
+async def test_the_clock_stands_still_while_a_thread_works_whose_caller_was_cancelled() -> None:
+    working = asyncio.ensure_future(asyncio.to_thread(time.sleep, 0.02))
+    await asyncio.sleep(0)
+    working.cancel()
+    before = time.monotonic()
+    await asyncio.sleep(3600)
+    assert time.monotonic() - before > 0.01
+
+
+async def test_a_thread_that_never_began_does_not_hold_the_clock() -> None:
+    with ThreadPoolExecutor(max_workers=1) as executor:
+        loop = asyncio.get_running_loop()
+        first = loop.run_in_executor(executor, time.sleep, 0.02)
+        second = loop.run_in_executor(executor, time.sleep, 0)
+        second.cancel()
+        await first
+        await asyncio.sleep(3600)
+    assert loop.time() == 3600
 
 
 async def test_bytes_on_a_real_socket_come_before_the_next_timer() -> None:

@@ -210,6 +210,9 @@ class Motion:
     async def end(self) -> None:
         """Stop what was started here, unless it was to go on; raises what a stop raises."""
         move = self._active.move if self._active is not None else None
+        if move is not None:
+            # Who leaves while a move runs does not await it any more; its error is no news to anybody.
+            move.add_done_callback(lambda move: None if move.cancelled() else move.exception())
         if move is not None and not move.is_on_wire:
             self._withdraw(move, self._reports.withdrawn(move))
         elif move is not None and move.on_cancel == "detach":

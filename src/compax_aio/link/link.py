@@ -140,13 +140,17 @@ class Link(asyncio.Protocol):
         if self._transport is None:
             return
         self._transport.close()
-        abort = self._loop.call_later(_CLOSE_GRACE_S, self._transport.abort)
+        abort = self._loop.call_later(_CLOSE_GRACE_S, self._abort)
         try:
             await asyncio.shield(self._closed)
         finally:
             abort.cancel()
-            if self._transport is not None:
-                self._transport.abort()
+            self._abort()
+
+    def _abort(self) -> None:
+        # After connection_lost, asyncio's own transports of CPython 3.11 do not bear it.
+        if self._transport is not None:
+            self._transport.abort()
 
     @property
     def is_open(self) -> bool:

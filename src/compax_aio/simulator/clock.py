@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 import selectors
 from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVarTuple, Unpack
 
 if TYPE_CHECKING:
@@ -29,7 +31,7 @@ class VirtualClockLoop(asyncio.SelectorEventLoop):
 
     def __init__(self) -> None:
         self._now = 0.0
-        self._threads_at_work = 0
+        self._jobs: set[_Job] = set()
         super().__init__(_JumpingSelector(self))
 
     def time(self) -> float:
@@ -43,17 +45,43 @@ class VirtualClockLoop(asyncio.SelectorEventLoop):
     @property
     def waits_for_threads(self) -> bool:
         """Whether a thread is at work, so that time must stand still."""
-        return self._threads_at_work > 0
+        return bool(self._jobs)
 
     def run_in_executor(self, executor: Any, func: Callable[[Unpack[_Ts]], Any], *args: *_Ts) -> asyncio.Future[Any]:
         """Run *func* in a thread; the clock stands still until it has returned."""
-        self._threads_at_work += 1
-        future = super().run_in_executor(executor, func, *args)
-        future.add_done_callback(self._thread_done)
+        job = _Job()
+
+        def work() -> Any:
+            job.has_begun = True
+            try:
+                return func(*args)
+            finally:
+                with suppress(RuntimeError):  # the loop is closed
+                    self.call_soon_threadsafe(self._thread_ended, job)
+
+        def result_taken(future: asyncio.Future[Any]) -> None:
+            job.result_is_awaited = False
+            if not job.is_at_work or (future.cancelled() and not job.has_begun):
+                self._jobs.discard(job)
+
+        self._jobs.add(job)
+        future = super().run_in_executor(executor, work)
+        future.add_done_callback(result_taken)
         return future
 
-    def _thread_done(self, _: asyncio.Future[Any]) -> None:
-        self._threads_at_work -= 1
+    def _thread_ended(self, job: _Job) -> None:
+        job.is_at_work = False
+        if not job.result_is_awaited:
+            self._jobs.discard(job)
+
+
+@dataclass(slots=True, eq=False)
+class _Job:
+    """A call in a thread: the clock stands still until it has ended, cancelled or not, and its result has arrived."""
+
+    has_begun: bool = False
+    is_at_work: bool = True
+    result_is_awaited: bool = True
 
 
 class _JumpingSelector(selectors.BaseSelector):
