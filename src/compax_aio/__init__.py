@@ -1,9 +1,12 @@
 """Move servo axes over a serial line or TCP and await the position reached."""
 
+from .compax.codecs import DriveStatus
 from .compax.drive import Drive, connect
 from .compax.group import DriveGroup, GroupMove
 from .compax.moves import Move, MoveResult
-from .compax.settings import DriveSettings
+from .compax.protocol import MessageForm
+from .compax.settings import Dialect, DriveSettings
+from .compax.vocabulary import Comparator, SpeedStep
 from .errors import (
     AnswerTimeoutError,
     CommandRejectedError,
@@ -24,15 +27,19 @@ from .errors import (
 __all__ = [
     "AnswerTimeoutError",
     "CommandRejectedError",
+    "Comparator",
     "CompaxError",
     "ConnectionLostError",
+    "Dialect",
     "Drive",
     "DriveFaultError",
     "DriveGroup",
     "DriveSettings",
+    "DriveStatus",
     "GroupMove",
     "InvalidCommandError",
     "LinkProtocolError",
+    "MessageForm",
     "Move",
     "MoveActiveError",
     "MoveError",
@@ -40,6 +47,7 @@ __all__ = [
     "MoveResult",
     "MoveStoppedError",
     "MoveTimeoutError",
+    "SpeedStep",
     "TransportError",
     "UnexpectedAnswerError",
     "connect",

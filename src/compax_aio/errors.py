@@ -1,20 +1,22 @@
 """
 Every exception of compax_aio, one tree.
 
-CompaxError
-├── TransportError                  the line could not be opened, or failed
-│   └── ConnectionLostError         an open line went away
-├── AnswerTimeoutError              the device did not answer in time
-├── CommandRejectedError            the device answered with an error
-├── InvalidCommandError             refused here, before a byte was sent (also a ValueError)
-│   └── MoveActiveError             a move is running on that drive (also a MoveError)
-├── UnexpectedAnswerError           the device answered something that is no answer to what was sent
-├── LinkProtocolError               a protocol was used out of turn: a defect in the caller's code
-└── MoveError                       a move did not end at its target
-    ├── MoveStoppedError            it was stopped on the way
-    ├── DriveFaultError             the drive reports a fault
-    ├── MoveTimeoutError            it took too long, or stands still without having arrived
-    └── MoveInDoubtError            nobody can say; look at the machine, then `reconcile()`
+.. code-block:: text
+
+    CompaxError
+    ├── TransportError                  the line could not be opened, or failed
+    │   └── ConnectionLostError         an open line went away
+    ├── AnswerTimeoutError              the device did not answer in time
+    ├── CommandRejectedError            the device answered with an error
+    ├── InvalidCommandError             refused here, before a byte was sent (also a ValueError)
+    │   └── MoveActiveError             a move is running on that drive (also a MoveError)
+    ├── UnexpectedAnswerError           the device answered something that is no answer to what was sent
+    ├── LinkProtocolError               a protocol was used out of turn: a defect in the caller's code
+    └── MoveError                       a move did not end at its target
+        ├── MoveStoppedError            it was stopped on the way
+        ├── DriveFaultError             the drive reports a fault
+        ├── MoveTimeoutError            it took too long, or stands still without having arrived
+        └── MoveInDoubtError            nobody can say; look at the machine, then `reconcile()`
 """
 
 from __future__ import annotations

@@ -291,12 +291,13 @@ class Drive:
 
         Raises:
             InvalidCommandError: *text* is not one plain line of at most 30 characters; nothing was sent.
+            MoveActiveError, MoveInDoubtError: It starts a motion, and a move is running or in doubt; nothing was sent.
         """
         line = check_line(text)
         if is_query(line):
             return await self._line.query(line)
         if starts_motion(line):
-            self._motion.has_untracked_motion = True
+            self._motion.note_untracked(line)
             await self._line.command(line, Lane.MOTION)
         else:
             await self._line.command(line)

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 from ..errors import InvalidCommandError, MoveStoppedError
 from ..link.cancellation import despite_cancellation
 from .drive import Connecting, Drive, connect
-from .moves import Move, MoveResult
+from .moves import Move, MoveResult, fetch_error
 from .settings import DriveSettings
 from .vocabulary import MovePlan, plan_home, plan_move_to
 
@@ -35,7 +35,7 @@ class GroupMove(asyncio.Future[dict[str, MoveResult]]):
         super().__init__()
         self.moves = dict(moves)
         self.accepted: asyncio.Future[None] = self.get_loop().create_future()
-        self.accepted.add_done_callback(lambda future: future.cancelled() or future.exception())
+        self.accepted.add_done_callback(fetch_error)
         self._watcher = self.get_loop().create_task(self._watch())
 
     def cancel(self, msg: Any = None) -> bool:
@@ -77,7 +77,7 @@ class GroupMove(asyncio.Future[dict[str, MoveResult]]):
         if culprit is not None:
             for axis, move in self.moves.items():
                 if errors.get(axis) is not culprit:
-                    culprit.add_note(f"{axis}: {_outcome(move)}")
+                    culprit.add_note(_outcome(axis, move))
             if not self.accepted.done():
                 self.accepted.set_exception(culprit)
             self.set_exception(culprit)
@@ -224,14 +224,19 @@ async def _all_at_once(work: Mapping[str, Coroutine[Any, Any, _Result]]) -> dict
     if errors:
         (_, first), *others = errors.items()
         for axis, error in others:
-            first.add_note(f"{axis}: {error}")
+            first.add_note(_told(axis, error))
         raise first
     return {axis: result for axis, result in by_axis.items() if not isinstance(result, BaseException)}
 
 
-def _outcome(move: Move) -> str:
+def _outcome(axis: str, move: Move) -> str:
     if move.cancelled():
-        return "cancelled"
+        return f"{axis}: cancelled"
     if (error := move.exception()) is not None:
-        return str(error)
-    return "reached its target"
+        return _told(axis, error)
+    return f"{axis}: reached its target"
+
+
+def _told(axis: str, error: BaseException) -> str:
+    """Say who failed and how; our own errors may begin with the name already."""
+    return str(error) if getattr(error, "device", None) == axis else f"{axis}: {error}"

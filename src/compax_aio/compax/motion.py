@@ -7,7 +7,7 @@ import logging
 
 from ..errors import CompaxError, MoveActiveError, MoveError, MoveInDoubtError, MoveTimeoutError
 from .codecs import DriveStatus
-from .moves import Move, OnCancel
+from .moves import Move, OnCancel, fetch_error
 from .observer import Observer
 from .pursuit import Memory, Pursuit
 from .reports import Reports
@@ -31,7 +31,7 @@ class Motion:
 
     def __init__(self, observer: Observer, settings: DriveSettings) -> None:
         self.name = observer.line.name
-        self.has_untracked_motion = False
+        self._has_untracked_motion = False
         self._observer = observer
         self._settings = settings
         self._reports = Reports(self.name, observer)
@@ -45,13 +45,8 @@ class Motion:
 
     def check(self, plan: MovePlan) -> None:
         """Raise what :meth:`start` would raise."""
-        if self._active is not None and not self._active.move.done():
-            raise MoveActiveError(
-                f"{self._active.move.plan.description} is running, so {plan.description} was not sent",
-                device=self.name,
-                hint="await it or stop it first; the drive would answer E92 (UG p. 162, 209)",
-            )
-        self._refuse_in_doubt(plan)
+        self._refuse_second(plan.description)
+        self._refuse_in_doubt(plan.description)
         if self._memory.points_prepared and not plan.finds_machine_zero:
             raise MoveError(
                 f"{plan.description} was not sent: the drive still holds {self._memory.points_prepared} speed steps or "
@@ -85,7 +80,7 @@ class Motion:
         try:
             if self._stopping is not None:
                 await asyncio.wait([self._stopping])
-                self._refuse_in_doubt(pursuit.move.plan)
+                self._refuse_in_doubt(pursuit.move.plan.description)
             await pursuit.carry_out()
         except MoveTimeoutError as error:
             # It stands still although its command is active, or stands elsewhere; it must not start later on.
@@ -101,10 +96,24 @@ class Motion:
                     await asyncio.wait([self._stopping])
             raise
 
-    def _refuse_in_doubt(self, plan: MovePlan) -> None:
+    def note_untracked(self, text: str) -> None:
+        """Take note of a motion that is sent as a raw command; it is refused like any other."""
+        self._refuse_second(repr(text))
+        self._refuse_in_doubt(repr(text))
+        self._has_untracked_motion = True
+
+    def _refuse_second(self, what: str) -> None:
+        if self._active is not None and not self._active.move.done():
+            raise MoveActiveError(
+                f"{self._active.move.plan.description} is running, so {what} was not sent",
+                device=self.name,
+                hint="await it or stop it first; the drive would answer E92 (UG p. 162, 209)",
+            )
+
+    def _refuse_in_doubt(self, what: str) -> None:
         if self._memory.doubt is not None:
             raise MoveInDoubtError(
-                f"{plan.description} was not sent, for {self._memory.doubt}",
+                f"{what} was not sent, for {self._memory.doubt}",
                 device=self.name,
                 hint="look at the machine, then call reconcile()",
             )
@@ -155,11 +164,14 @@ class Motion:
             reason: What the move that is stopped shall raise, if not MoveStoppedError.
         """
         pursuit = self._release()
+        if pursuit is not None and reason is None:
+            # Whoever stops a move from here knows; it is no news that nobody fetched.
+            pursuit.move.add_done_callback(fetch_error)
         if pursuit is not None and not pursuit.move.is_on_wire:
-            self._withdraw(pursuit.move, self._reports.withdrawn(pursuit.move))
+            self._withdraw(pursuit.move, reason or self._reports.withdrawn(pursuit.move))
             pursuit = None
         if self._stopping is None:
-            self.has_untracked_motion = False
+            self._has_untracked_motion = False
             stop = Stop(self._observer, self._settings)
             self._stopping = self._loop.create_task(self._stop(stop, pursuit, reason), name=f"{self.name}: stop")
             self._stopping.add_done_callback(self._stop_done)
@@ -211,13 +223,12 @@ class Motion:
         """Stop what was started here, unless it was to go on; raises what a stop raises."""
         move = self._active.move if self._active is not None else None
         if move is not None:
-            # Who leaves while a move runs does not await it any more; its error is no news to anybody.
-            move.add_done_callback(lambda move: None if move.cancelled() else move.exception())
+            move.add_done_callback(fetch_error)
         if move is not None and not move.is_on_wire:
             self._withdraw(move, self._reports.withdrawn(move))
         elif move is not None and move.on_cancel == "detach":
             self._withdraw(move, self._reports.unwatched(move))
-        elif move is not None or self.has_untracked_motion:
+        elif move is not None or self._has_untracked_motion:
             self.begin_stop()
         if self._stopping is not None:
             await asyncio.shield(self._stopping)

@@ -10,7 +10,7 @@ from typing import Any, Literal, Protocol
 from ..errors import CompaxError
 from .vocabulary import MovePlan
 
-__all__ = ["Move", "MoveOwner", "MoveResult", "OnCancel"]
+__all__ = ["Move", "MoveOwner", "MoveResult", "OnCancel", "fetch_error"]
 
 OnCancel = Literal["stop", "detach"]
 
@@ -71,7 +71,7 @@ class Move(asyncio.Future[MoveResult]):
         super().__init__()
         self.accepted: asyncio.Future[None] = self.get_loop().create_future()
         # Whoever awaits only the move learns the same error there.
-        self.accepted.add_done_callback(_retrieve)
+        self.accepted.add_done_callback(fetch_error)
         self.plan = plan
         self.target = plan.target
         self.on_cancel = on_cancel
@@ -193,6 +193,7 @@ class Move(asyncio.Future[MoveResult]):
             self.set_exception(error)
 
 
-def _retrieve(future: asyncio.Future[None]) -> None:
+def fetch_error(future: asyncio.Future[Any]) -> None:
+    """Take note of how *future* ended, so that asyncio does not complain that nobody did."""
     if not future.cancelled():
         future.exception()

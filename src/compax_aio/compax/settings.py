@@ -56,7 +56,7 @@ class DriveSettings:
     message_form: MessageForm = MessageForm.UNKNOWN
     verify_messages: bool = False
     poll_first_s: float = 0.1
-    poll_slowest_s: float = 1.0
+    poll_slowest_s: float = 0.5
     stall_timeout_s: float = 10.0
     in_doubt_after_s: float = 30.0
     stop_timeout_s: float = 10.0

@@ -69,6 +69,15 @@ class VirtualClockLoop(asyncio.SelectorEventLoop):
         future.add_done_callback(result_taken)
         return future
 
+    async def shutdown_default_executor(self, timeout: float | None = None) -> None:  # noqa: ARG002, ASYNC109
+        """Wait until all threads have ended; the clock stands still meanwhile, so no *timeout* can come first."""
+        job = _Job()
+        self._jobs.add(job)
+        try:
+            await super().shutdown_default_executor()
+        finally:
+            self._jobs.discard(job)
+
     def _thread_ended(self, job: _Job) -> None:
         job.is_at_work = False
         if not job.result_is_awaited:

@@ -35,7 +35,7 @@ class Knobs:
     """
     How one simulated drive behaves where the manuals leave it open, and what it moves.
 
-    "Row" is the row of the table in section 14 of the project's fact sheet, whose first option is the default.
+    Where the pages at hand leave several readings open, the default is the likeliest, and each other one can be set.
 
     Raises:
         TransportError: A value is not possible; says which are.
@@ -44,39 +44,39 @@ class Knobs:
     # How it answers
 
     error_style: Literal["code", "text", "prompt_only", "silent"] = "code"
-    """Rows 1 and 2: ``E92`` and prompt; ``E92 command active`` and prompt; a bare prompt; nothing at all."""
+    """``E92`` and prompt; ``E92 command active`` and prompt; a bare prompt; nothing at all."""
     position_reached: Literal["prompt_first", "final_only"] = "prompt_first"
-    """Row 3: an accepted ``$`` command gets its prompt and later ``$``; or nothing but the final ``$``."""
+    """An accepted ``$`` command gets its prompt and later ``$``; or nothing but the final ``$``."""
     position_reached_on_stop: bool = False
-    """Row 12: ``$`` is sent also when STOP, BREAK or a fault ended the move (then once, not again after START)."""
+    """``$`` is sent also when STOP, BREAK or a fault ended the move (then once, not again after START)."""
     position_reached_on_home: bool = True
-    """Row 12: ``POSA HOME$`` sends ``$``; if not, it is accepted and sends none."""
+    """``POSA HOME$`` sends ``$``; if not, it is accepted and sends none."""
     comparator_messages: Literal["always", "with_sign"] = "always"
-    """Row 4: comparators send their number in every move, or only in one that carried ``$``."""
+    """Comparators send their number in every move, or only in one that carried ``$``."""
     comparator_form: Literal["number_first", "prompt_first"] = "number_first"
-    """Row 5: ``n CR LF >`` or ``CR LF > n``."""
+    """``n CR LF >`` or ``CR LF > n``."""
     comparator_numbering: Literal["comparators", "points"] = "comparators"
     """The number counts comparators alone, or all prepared points, speed steps too (UG p. 162 leaves it open)."""
     reply_padding: Literal["none", "blanks", "unit"] = "none"
-    """Row 7: ``S001: 123.45``; right-aligned between blanks; followed by the unit."""
+    """``S001: 123.45``; right-aligned between blanks; followed by the unit."""
     decimals: Literal[2, 3] = 2
-    """Row 8: of positions and distances, in and out (UG p. 100); ``unit=inch`` in a query means 3 unless it says."""
+    """Of positions and distances, in and out (UG p. 100); ``unit=inch`` in a query means 3 unless it says."""
     status_bits_blank: bool = False
-    """Row 9: S16 and S17 as ``1101 0000``."""
+    """S16 and S17 as ``1101 0000``."""
     fault_numbers: Literal["two", "one"] = "two"
-    """Row 10: S30 is ``55 0`` or ``55``."""
+    """S30 is ``55 0`` or ``55``."""
     echo_sign: Literal["echo_and_execute", "echo_only"] = "echo_and_execute"
-    """Row 11: what ``?`` does besides sending back what was received."""
+    """What ``?`` does besides sending back what was received."""
     store: Literal["until_executed", "until_next_line"] = "until_executed"
     """How long ``,`` keeps an instruction: until ``!`` took it, or at most until any other line."""
     long_line: Literal["error", "truncate"] = "error"
-    """Row 17: more than 30 characters are refused, or cut."""
+    """More than 30 characters are refused, or cut."""
     echo: bool = False
-    """Row 18: a received line comes back with its CR before it is answered."""
+    """A received line comes back with its CR before it is answered."""
     power_on_text: Literal["nothing", "prompt", "banner"] = "nothing"
-    """Row 19."""
+    """What the drive sends when power comes back."""
     lower_case: Literal["folded", "error"] = "folded"
-    """Row 20."""
+    """What becomes of small letters: the fieldbus wants capitals (IBS p. 23), RS-232 does not say."""
     ready_after_answer: bool = False
     """A command is received only after the last answer is out (UG p. 160): bytes before that are lost, not kept."""
     xonxoff: bool = False
@@ -87,7 +87,7 @@ class Knobs:
     baudrate: Literal[0, 9600, 4800] = 0
     """Byte timing of both directions, ten bits a byte; 0: bytes take no time."""
     answer_time_s: _Seconds = 0.002
-    """From the CR of a line to its execution and the first byte of its answer (unknown; section 11)."""
+    """From the CR of a line to its execution and the first byte of its answer (not documented)."""
     self_test_s: _Seconds = 0.0
     """After power-on, S16 bit 1 stays 0 and positioning is refused for so long (UG p. 209; the time is unknown)."""
 

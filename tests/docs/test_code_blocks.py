@@ -1,0 +1,116 @@
+"""
+Every Python block of README and documents runs, and what stands under it as its output is what it prints.
+
+The blocks of a page are one program: they share names and an event loop on a virtual clock, and may await. A fence
+marked ``output`` right after a block holds all that the block prints, from the beginning of a line to its end; ``...``
+stands for anything on one line.
+"""
+
+from __future__ import annotations
+
+import ast
+import asyncio
+import inspect
+import re
+import textwrap
+from collections.abc import Callable, Coroutine, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from compax_aio.simulator.clock import VirtualClockLoop
+
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]
+LANGUAGES = {"python", "output", "text", "toml", "sh", "ini", "{eval-rst}", "{toctree}"}
+
+_FENCE = re.compile(r"^(?P<indent> *)```(?P<language>\S*)[^\n]*\n(?P<text>.*?)^ *```\s*$", re.MULTILINE | re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Block:
+    line: int
+    source: str
+    output: str | None
+
+
+def fences_of(page: Path) -> Iterator[tuple[str, str, int, str]]:
+    """Give language, text, line number, and what stood between this fence and the one before."""
+    text, end = page.read_text(), 0
+    for fence in _FENCE.finditer(text):
+        line = text.count("\n", 0, fence.start("text")) + 1
+        yield fence["language"], textwrap.dedent(fence["text"]), line, text[end : fence.start()]
+        end = fence.end()
+
+
+def blocks_of(page: Path) -> list[Block]:
+    blocks: list[Block] = []
+    before = ""
+    for language, text, line, between in fences_of(page):
+        if language == "python":
+            blocks.append(Block(line, text, None))
+        elif language == "output":
+            assert before == "python", f"{page.name}:{line}: an output without its block"
+            assert not between.strip(), f"{page.name}:{line}: an output away from its block"
+            blocks[-1] = Block(blocks[-1].line, blocks[-1].source, text)
+        before = language
+    return blocks
+
+
+def name_of(page: Path) -> str:
+    return str(page.relative_to(ROOT))
+
+
+def run_block(block: Block, page: Path, names: dict[str, Any], run: Callable[[Coroutine[Any, Any, Any]], Any]) -> None:
+    # Blank lines in front make the line numbers of a traceback those of the page.
+    tree = ast.parse("\n" * (block.line - 1) + block.source, str(page))
+    code = compile(tree, str(page), "exec", flags=ast.PyCF_ALLOW_TOP_LEVEL_AWAIT, dont_inherit=True)
+    if "asyncio.run(" in block.source:
+        exec(code, names)
+        return
+
+    async def inside_the_loop() -> None:
+        result = eval(code, names)
+        if inspect.isawaitable(result):
+            await result
+
+    run(inside_the_loop())
+
+
+def matches(pattern: str, printed: str) -> bool:
+    regex = "".join(r"[^\n]*" if part == "..." else re.escape(part) for part in re.split(r"(\.\.\.)", pattern))
+    return re.fullmatch(regex, printed) is not None
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if blocks_of(page)], ids=name_of)
+def test_the_code_of_a_page_runs_and_prints_what_the_page_says(
+    page: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, Any] = {"__name__": "__main__"}
+    with asyncio.Runner(loop_factory=VirtualClockLoop) as runner:
+        monkeypatch.setattr(asyncio, "run", runner.run)
+        for block in blocks_of(page):
+            run_block(block, page, names, runner.run)
+            printed = capsys.readouterr().out
+            if block.output is not None and not matches(block.output, printed):
+                assert printed == block.output, f"{name_of(page)}:{block.line}: it prints something else"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_every_block_says_what_it_is(page: Path) -> None:
+    unknown = [(line, language) for language, _, line, _ in fences_of(page) if not _is_known(language)]
+    assert not unknown
+
+
+def _is_known(language: str) -> bool:
+    return language in LANGUAGES or language.startswith("{table-of-")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_relative_links_lead_somewhere(page: Path) -> None:
+    links = re.findall(r"\]\((?!https?:|#|mailto:)([^)#\s]+)", page.read_text())
+    missing = [link for link in links if not (page.parent / link).exists()]
+    assert not missing
