@@ -26,7 +26,9 @@ __all__ = [
     "value_text",
 ]
 
-_NUMBER: Final = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)")
+# Blanks may stand anywhere (UG p. 160), between a sign and its number too; digits behind a letter are a name: "E92".
+_NUMBER: Final = re.compile(r"(?<![A-Za-z\d.])([-+]?)\s*(\d+(?:\.\d*)?|\.\d+)")
+_HEAD: Final = re.compile(r"[SPVN]\d+\s*[:=]?|[:=]")
 _BITS: Final = re.compile(r"[01]{8}")
 _FACTS: Final = {fact.number: fact for fact in STATUS_VALUES}
 
@@ -70,12 +72,7 @@ class DriveStatus:
         Raises:
             UnexpectedAnswerError: An answer has not eight binary digits.
         """
-        digits = []
-        for answer in (s16, s17):
-            text = value_text(answer).replace(" ", "")
-            if not _BITS.fullmatch(text):
-                raise UnexpectedAnswerError("a status has eight binary digits (UG p. 209)", received=answer)
-            digits.append(text)
+        digits = [_bits(s16), _bits(s17)]
         return cls(
             s16=digits[0],
             s17=digits[1],
@@ -107,12 +104,9 @@ class HistoryEntry:
 
 def value_text(answer: str) -> str:
     """Return what stands behind the colon of an answer, or behind its number where there is no colon."""
-    head, separator, tail = answer.partition(":")
-    if not separator:
-        head, separator, tail = answer.partition("=")
-    if not separator:
-        tail = re.sub(r"^[SPVN]\d+\s*", "", head)
-    return tail.strip()
+    answer = answer.strip()
+    head = _HEAD.match(answer)
+    return answer[head.end() :].strip() if head else answer
 
 
 def decode_number(answer: str) -> float:
@@ -125,7 +119,7 @@ def decode_number(answer: str) -> float:
     found = _NUMBER.search(value_text(answer))
     if found is None:
         raise UnexpectedAnswerError("the answer holds no number", received=answer)
-    return float(found[0])
+    return float(found[1] + found[2])
 
 
 def decode_status_value(number: int, answer: str, axis_unit: str) -> StatusValue:
@@ -141,9 +135,9 @@ def decode_status_value(number: int, answer: str, axis_unit: str) -> StatusValue
     if fact.form is Form.NUMBER:
         value = decode_number(answer)
     elif fact.form is Form.BITS:
-        value = raw.replace(" ", "")
+        value = _bits(answer)
     elif fact.form in (Form.HISTORY, Form.PAIR):
-        value = tuple(int(code) for code in re.findall(r"\d+", raw))
+        value = tuple(_codes(answer))
     unit = axis_unit if fact.unit == "axis" else fact.unit
     return StatusValue(number=number, raw=raw, value=value, meaning=fact.meaning, unit=unit)
 
@@ -152,7 +146,7 @@ def decode_history(answer: str) -> tuple[HistoryEntry, ...]:
     """Decode S18, newest first; a mark (98, 99) stands before the error that it ended (UG p. 209)."""
     entries = []
     ended_by: str | None = None
-    for code in (int(code) for code in re.findall(r"\d+", value_text(answer))):
+    for code in _codes(answer):
         if code == HISTORY_ACKNOWLEDGED:
             ended_by = "acknowledged"
         elif code == HISTORY_POWERED_ON:
@@ -166,5 +160,18 @@ def decode_history(answer: str) -> tuple[HistoryEntry, ...]:
 
 def decode_error(answer: str) -> DeviceError | None:
     """Decode S30, one number or two in an order that is not documented: the first that is not zero (IBS p. 12)."""
-    codes = [int(code) for code in re.findall(r"\d+", value_text(answer))]
-    return next((device_error(code) for code in codes if code), None)
+    return next((device_error(code) for code in _codes(answer) if code), None)
+
+
+def _bits(answer: str) -> str:
+    text = value_text(answer).replace(" ", "")
+    if not _BITS.fullmatch(text):
+        raise UnexpectedAnswerError("a status has eight binary digits (UG p. 209)", received=answer)
+    return text
+
+
+def _codes(answer: str) -> list[int]:
+    codes = re.findall(r"\d+", value_text(answer))
+    if not codes:
+        raise UnexpectedAnswerError("the answer holds no error code (UG p. 209)", received=answer)
+    return [int(code) for code in codes]

@@ -34,18 +34,16 @@ from .line import DriveLine
 from .motion import Motion
 from .moves import Move, OnCancel
 from .observer import Observer
+from .plain_line import check_line, is_query, starts_motion
 from .protocol import ComparatorReached, PositionReached, Stray
 from .settings import DriveSettings
 from .vocabulary import (
     Comparator,
     MovePlan,
     SpeedStep,
-    check_line,
-    is_query,
     plan_home,
     plan_move_by,
     plan_move_to,
-    starts_motion,
 )
 
 __all__ = ["Connecting", "Drive", "connect"]
@@ -285,7 +283,7 @@ class Drive:
 
     async def command(self, text: str) -> str:
         """
-        Send one line, and return what came before the prompt: nothing, for a command.
+        Send one line, in capitals (IBS p. 23), and return what came before the prompt: nothing, for a command.
 
         A motion that is started so is not watched; leaving the block stops the drive all the same.
 
@@ -293,7 +291,7 @@ class Drive:
             InvalidCommandError: *text* is not one plain line of at most 30 characters; nothing was sent.
             MoveActiveError, MoveInDoubtError: It starts a motion, and a move is running or in doubt; nothing was sent.
         """
-        line = check_line(text)
+        line = check_line(text.upper())
         if is_query(line):
             return await self._line.query(line)
         if starts_motion(line):
@@ -305,12 +303,18 @@ class Drive:
 
     async def query(self, text: str) -> str:
         """
-        Ask one line, and return the whole answer: ``query("S1")`` gives ``"S001: 120.50"``.
+        Ask one line, in capitals, and return the whole answer: ``query("S1")`` gives ``"S001: 120.50"``.
 
         Raises:
-            InvalidCommandError: *text* is not one plain line of at most 30 characters; nothing was sent.
+            InvalidCommandError: *text* is not one plain line of at most 30 characters, or starts a motion; nothing
+                was sent.
         """
-        return await self._line.ask_freely(check_line(text))
+        line = check_line(text.upper())
+        if is_query(line):
+            return await self._line.query(line)
+        if starts_motion(line):
+            raise InvalidCommandError(f"{text!r} starts a motion, it asks nothing", hint="use move_to() or command()")
+        return await self._line.ask_freely(line)
 
     # Events and life ------------------------------------------------------------------------------------------------
 

@@ -65,7 +65,7 @@ class DriveLine:
 
     async def ask_freely(self, text: str) -> str:
         """Ask something whose answer has no known beginning; whatever text comes is the answer."""
-        outcome = await self.link.exchange(text, Lane.READ)
+        outcome = await self.link.exchange(text, Lane.CONTROL)
         if isinstance(outcome, Answered | UnexpectedAnswer):
             return outcome.text
         raise self.error_of(text, outcome)

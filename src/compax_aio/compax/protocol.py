@@ -40,8 +40,8 @@ __all__ = [
 _MAX_TOKEN: Final = 256
 """Bytes kept while no prompt comes; the longest answer documented has 29 (UG p. 209)."""
 
-_MAX_LEDGER: Final = 256
-"""Lines remembered as unanswered; far more than any buffer between here and the drive holds back."""
+_MAX_LEDGER: Final = 16_384
+"""Lines remembered as unanswered: as markers, 64 KiB, which is what a transport takes before it says it is full."""
 
 
 class State(Enum):
@@ -172,7 +172,7 @@ _DOUBTFUL: Final = frozenset({State.IN_DOUBT, State.AWAITING_MARKER, State.AWAIT
 _QUERY: Final = re.compile(r"([SPVN])0*(\d{1,3})")
 _ANSWER: Final = re.compile(r"([SPVN])0*(\d{1,3})(?!\d)\s*[:=]?\s*(.*)", re.DOTALL)
 # "E" and digits anywhere on the line, with or without text around them; the manual's page on it was not available.
-_ERROR: Final = re.compile(r"(?<![A-Z0-9.])E(\d{1,3})(?![\d.])")
+_ERROR: Final = re.compile(r"(?<![A-Z0-9.])E(\d{1,3})(?!\d|\.\d)")
 _COMPARATOR: Final = re.compile(rf"[1-{MAX_PREPARED_POINTS}]")
 # The running text of UG p. 162 prints prompt, then number: such a number stands right before the next answer.
 _COMPARATOR_BEFORE: Final = re.compile(rf"([1-{MAX_PREPARED_POINTS}])\s*(?=[SPVNE$])")
@@ -189,7 +189,7 @@ class _Sent:
 
     @classmethod
     def of(cls, text: str) -> _Sent:
-        query = _QUERY.fullmatch(text)
+        query = _QUERY.fullmatch(text.replace(" ", ""))
         return cls(text, (query[1], query[2]) if query else None)
 
     @property
@@ -214,6 +214,7 @@ class CompaxProtocol:
         self._events: list[Event] = []
         self._next_marker = 0
         self._number_may_follow = False
+        self._flood = ""
 
     # What the link asks ---------------------------------------------------------------------------------------------
 
@@ -232,6 +233,11 @@ class CompaxProtocol:
     def line_opened(self) -> None:
         """Take note that the line is new; what stands in the drive's buffer is unknown."""
         self._received.clear()
+        self._to_send.clear()
+        self._flood = ""
+        self._number_may_follow = False
+        # Queries of the old line may still be answered, by a device server; a prompt on the new one proves nothing.
+        self._ledger = deque((sent for sent in self._ledger if sent.key), maxlen=_MAX_LEDGER)
         self._step(_LineOpened())
 
     def send(self, text: str) -> None:
@@ -261,16 +267,22 @@ class CompaxProtocol:
 
     def receive(self, data: bytes) -> None:
         """Read *data*, a piece of any size; see :meth:`events`."""
-        self._received += data
+        # Flow control comes anywhere, in the middle of a prompt too.
+        self._received += data.translate(None, _NOT_TEXT)
         while (end := self._received.find(PROMPT)) >= 0:
             self._read_number_after_prompt()
             end = self._received.find(PROMPT)
-            token = bytes(self._received[:end])
+            token = bytes(self._received[: min(end, _MAX_TOKEN + 1)])
             del self._received[: end + len(PROMPT)]
-            self._read_token(token)
+            if len(token) > _MAX_TOKEN:
+                self._begin_flood(token)
+            if self._flood:
+                self._end_flood()
+            else:
+                self._read_token(token)
         self._read_number_after_prompt()
-        if len(self._received) > _MAX_TOKEN:
-            self._notice(Stray(_as_text(bytes(self._received))))
+        if len(self._received) > _MAX_TOKEN + len(PROMPT) - 1:
+            self._begin_flood(bytes(self._received))
             del self._received[: 1 - len(PROMPT)]
 
     def events(self) -> list[Event]:
@@ -322,6 +334,18 @@ class CompaxProtocol:
                 del self._received[:1]
                 self._notice(ComparatorReached(int(number[0])))
 
+    def _begin_flood(self, data: bytes) -> None:
+        """Note that more has come than any answer has; once, until the next prompt."""
+        if not self._flood:
+            self._flood = _as_text(data[:_MAX_TOKEN])
+            self._notice(Stray(self._flood))
+
+    def _end_flood(self) -> None:
+        """Read the prompt that ends a flood: it acknowledges nothing."""
+        text, self._flood = self._flood, ""
+        if self.state is State.AWAITING_ANSWER and self._ledger[-1].key is None:
+            self._end_turn(UnexpectedAnswer(text))
+
     def _read_token(self, raw: bytes) -> None:
         """Read what stood before one prompt: usually one line or none, after noise or an echo more."""
         lines = [line.strip(" \t>") for line in re.split(r"[\r\n]+", _as_text(raw))]
@@ -332,10 +356,15 @@ class CompaxProtocol:
 
     def _without_echo(self, line: str) -> str:
         """Take off an echo of the line that is outstanding, with its CR or glued to the answer."""
-        if not self._ledger or not line.startswith(sent := self._ledger[-1].text):
+        if not self._ledger or not line.startswith((sent := self._ledger[-1]).text):
             return line
-        rest = line[len(sent) :].lstrip()
-        return rest if not rest or rest[0] in "SPVNE$" else line
+        rest = line[len(sent.text) :].lstrip()
+        if sent.key is None:
+            return rest if not rest or rest[0] in "SPVNE$" else line
+        # "N5 END" is the answer to "N5", with a blank for a colon; "N5N005: END" is an echo and the answer.
+        answer = _ANSWER.fullmatch(rest)
+        is_echo = not rest or (answer is not None and (answer[1], answer[2]) == sent.key)
+        return rest if is_echo or re.fullmatch(r"E\d{1,3}", line[len(sent.text) :]) else line
 
     def _read_unterminated(self, line: str) -> None:
         """Read a line whose prompt did not come through; it ends no turn."""

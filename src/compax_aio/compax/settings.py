@@ -7,6 +7,7 @@ from math import isfinite
 
 from ..errors import InvalidCommandError
 from .facts.limits import MAX_SPEED_PERCENT, POSITION_DECIMALS, POSITION_DECIMALS_INCH
+from .plain_line import check_line
 from .protocol import MessageForm
 
 __all__ = ["Dialect", "DriveSettings"]
@@ -65,16 +66,20 @@ class DriveSettings:
 
     def __post_init__(self) -> None:
         """Refuse what cannot be meant."""
+        for each in fields(self.dialect):
+            check_line(getattr(self.dialect, each.name))
         for each in fields(self):
             value = getattr(self, each.name)
             if each.name.endswith("_s") and not (isfinite(value) and value > 0):
                 raise InvalidCommandError(f"{each.name} must be a finite number of seconds above 0, not {value!r}")
-        if self.decimals not in (POSITION_DECIMALS, POSITION_DECIMALS_INCH):
+        if type(self.decimals) is not int or self.decimals not in (POSITION_DECIMALS, POSITION_DECIMALS_INCH):
             raise InvalidCommandError(f"decimals must be 2, or 3 for inches, not {self.decimals!r}")
         if not 0 < self.speed_limit_percent <= MAX_SPEED_PERCENT:
             raise InvalidCommandError(
                 f"speed_limit_percent must be above 0 and at most {MAX_SPEED_PERCENT:g}, "
                 f"not {self.speed_limit_percent!r}"
             )
-        if self.resync_attempts < 1:
-            raise InvalidCommandError(f"resync_attempts must be at least 1, not {self.resync_attempts!r}")
+        if type(self.resync_attempts) is not int or self.resync_attempts < 1:
+            raise InvalidCommandError(
+                f"resync_attempts must be a whole number and at least 1, not {self.resync_attempts!r}"
+            )

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from decimal import Decimal
 from math import isfinite
 from numbers import Real
-from typing import Final, TypeVar
+from typing import TypeVar
 
 from ..errors import InvalidCommandError
 from .facts.limits import (
@@ -18,34 +17,19 @@ from .facts.limits import (
     OUTPUT_NUMBERS,
     SPEED_DECIMALS,
 )
-from .facts.line import (
-    ECHO_SIGN,
-    EXECUTE_SIGN,
-    MAX_LINE_LENGTH,
-    POSITION_REACHED_SIGN,
-    STORE_SIGN,
-)
+from .plain_line import check_line
 from .settings import DriveSettings
 
 __all__ = [
     "Comparator",
     "MovePlan",
     "SpeedStep",
-    "check_line",
-    "is_query",
     "plan_home",
     "plan_move_by",
     "plan_move_to",
-    "starts_motion",
 ]
 
 _Point = TypeVar("_Point")
-
-_QUERY: Final = re.compile(r"[SPVN]\d{1,3}")
-_MOTION: Final = re.compile(r"\s*(P\s*O\s*S|P\s*[AHR]|L\s*O\s*O\s*P|S\s*T\s*A\s*R\s*T|W\s*A\s*I\s*T)", re.IGNORECASE)
-_PREPARED: Final = re.compile(r"S\s*P\s*E\s*E\s*D|S\s*D|O\s*U\s*T|O\s*T", re.IGNORECASE)
-
-_SIGNS: Final = frozenset({POSITION_REACHED_SIGN, STORE_SIGN, EXECUTE_SIGN, ECHO_SIGN, ">"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,6 +125,10 @@ def plan_move_by(
         InvalidCommandError: A number is not finite, out of range, or cannot be said to this drive.
     """
     rounded = _position("distance", distance, settings)
+    if rounded == 0 != distance:
+        raise InvalidCommandError(
+            f"distance {distance!r} is nothing once rounded to the drive's {settings.decimals} decimals (UG p. 100)"
+        )
     return MovePlan(
         description=f"move_by({_written(rounded, settings.decimals)})",
         distance=rounded,
@@ -159,45 +147,6 @@ def plan_home(settings: DriveSettings) -> MovePlan:
         may_ask_for_message=False,
         finds_machine_zero=True,
     )
-
-
-def check_line(text: str, *, room_for_sign: bool = False) -> str:
-    """
-    Return *text* without blanks around it, if it is one line that the drive can be told.
-
-    Raises:
-        InvalidCommandError: It is empty, longer than the entry buffer (30 characters, UG p. 160), not printable
-            ASCII, or holds a character that carries meaning: CR, LF, ``$ ? ! , >``.
-    """
-    line = text.strip(" ")
-    for character in line:
-        if character in _SIGNS:
-            raise InvalidCommandError(
-                f"{character!r} in {text!r} is a sign of the line, not part of a command",
-                hint="moves ask for their message themselves; send one plain command at a time",
-            )
-        if not " " <= character <= "~":
-            raise InvalidCommandError(
-                f"{character!r} in {text!r} cannot be sent: a line is printable ASCII (UG p. 160)",
-                hint="send one command at a time, without its end sign",
-            )
-    longest = MAX_LINE_LENGTH - room_for_sign
-    if not line or len(line) > longest:
-        raise InvalidCommandError(
-            f"{text!r} has {len(line)} characters; the drive's entry buffer takes 1 to {longest} (UG p. 160)",
-            hint="use the short forms of the commands (PA, PR, SD, AL, OT) and leave out blanks",
-        )
-    return line
-
-
-def is_query(line: str) -> bool:
-    """Whether *line* asks for a status, parameter, variable or record, and its answer begins with the same."""
-    return _QUERY.fullmatch(line) is not None
-
-
-def starts_motion(line: str) -> bool:
-    """Whether *line* sets the axis in motion (UG p. 162), or the program that may; prepared points do not."""
-    return _MOTION.match(line) is not None and not _PREPARED.search(line)
 
 
 def _settings_lines(
@@ -288,7 +237,10 @@ def _ramp_time(what: str, value: int) -> int:
 def _number(what: str, value: object) -> float:
     if isinstance(value, bool) or not (isinstance(value, Real | Decimal)):
         raise InvalidCommandError(f"{what} must be a number, not {value!r}")
-    number = float(value)
+    try:
+        number = float(value)
+    except (OverflowError, ValueError):
+        raise InvalidCommandError(f"{what} must be finite and in range, not {value!r:.60}") from None
     if not isfinite(number):
         raise InvalidCommandError(f"{what} must be finite, not {value!r}")
     return number

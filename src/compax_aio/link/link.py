@@ -13,6 +13,7 @@ import logging
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import cast
 
 from ..errors import AnswerTimeoutError, CompaxError, ConnectionLostError
 from ..transports.registry import open_transport
@@ -24,6 +25,7 @@ __all__ = ["Link", "LinkStats"]
 _log = logging.getLogger(__name__)
 
 _CLOSE_GRACE_S = 0.5
+_ABORT_GRACE_S = 1.0
 
 
 @dataclass(slots=True)
@@ -107,8 +109,10 @@ class Link(asyncio.Protocol):
         self._shared: dict[str, _Exchange] = {}
         self._outstanding: _Exchange | None = None
         self._doubtful: _Exchange | None = None
+        self._doubtful_received: str | None = None
         self._opening: asyncio.Future[None] | None = None
         self._markers_left = 0
+        self._is_pursuing = False
         self._may_send_ahead = False
         self._is_reading = False
         self._deadline = 0.0
@@ -142,10 +146,13 @@ class Link(asyncio.Protocol):
         self._transport.close()
         abort = self._loop.call_later(_CLOSE_GRACE_S, self._abort)
         try:
-            await asyncio.shield(self._closed)
+            await asyncio.wait([self._closed], timeout=_CLOSE_GRACE_S + _ABORT_GRACE_S)
         finally:
             abort.cancel()
             self._abort()
+        if not self._closed.done():
+            _log.error("%s: the transport did not report its end", self._name)
+            self.connection_lost(None)
 
     def _abort(self) -> None:
         # After connection_lost, asyncio's own transports of CPython 3.11 do not bear it.
@@ -204,8 +211,10 @@ class Link(asyncio.Protocol):
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Take the transport, and begin to get in step."""
-        assert isinstance(transport, asyncio.Transport)
-        self._transport = transport
+        self._transport = cast("asyncio.Transport", transport)  # uvloop's transports are no subclasses
+        if self._is_closing:  # while it was being opened
+            self._transport.abort()
+            return
         self._protocol.line_opened()
         self._begin_doubt()
         self._pump()
@@ -236,6 +245,7 @@ class Link(asyncio.Protocol):
         if not self._closed.done():
             self._closed.set_result(None)
         self._markers_left = 0
+        self._is_pursuing = False
         self._fail_waiting(lambda text: self._lost_error(text, exc))
         if self._opening is not None and not self._opening.done():
             self._opening.set_exception(self._lost_error(None, exc))
@@ -304,21 +314,24 @@ class Link(asyncio.Protocol):
 
     def _begin_doubt(self) -> None:
         self._markers_left = self._resync_attempts
+        self._is_pursuing = True
         self._may_send_ahead = True
 
     def _ensure_doubt_is_pursued(self) -> None:
-        if self._protocol.in_doubt and not self._protocol.is_busy and not self._markers_left:
+        if not self._is_pursuing and self._protocol.in_doubt and not self._protocol.is_busy and not self._markers_left:
             self._begin_doubt()
 
     def _pursue_doubt(self) -> bool:
         """Send the next thing that helps to get in step; False when there is nothing left to try."""
         stop = next((exchange for exchange in self._lanes[Lane.STOP] if exchange.is_wanted), None)
-        if stop is not None and self._may_send_ahead:
-            # Half a line in the device's buffer may spoil this one; the exchange itself follows when in step.
+        if stop is not None and self._may_send_ahead and self._markers_left:
+            # In turn with the markers, for half a line in the device's buffer may spoil either; the exchange itself
+            # follows when in step.
             self._may_send_ahead = False
             self._protocol.send_ahead(stop.text)
         elif self._markers_left:
             self._markers_left -= 1
+            self._may_send_ahead = True
             self._protocol.send_marker()
         else:
             return False
@@ -329,12 +342,14 @@ class Link(asyncio.Protocol):
     def _end_doubt(self) -> None:
         self.stats.resynchronisations += 1
         self._markers_left = 0
+        self._is_pursuing = False
         self._fail_doubtful()
         if self._opening is not None and not self._opening.done():
             self._opening.set_result(None)
 
     def _give_up(self) -> None:
         """Tell everyone who waits that nobody answers. What is asked next begins anew."""
+        self._is_pursuing = False
         self._fail_waiting(self._silent_error)
         if self._opening is not None and not self._opening.done():
             self._opening.set_exception(self._silent_error(None))
@@ -365,6 +380,7 @@ class Link(asyncio.Protocol):
             exchange, self._outstanding = self._outstanding, None
             _log.warning("%s: no answer to %r within %g s", self._name, exchange.text, self._answer_timeout_s)
             self._doubtful = exchange
+            self._doubtful_received = self.history.received_since_sent()
             if not exchange.settles_late:
                 self._fail_doubtful()
             self._begin_doubt()
@@ -387,7 +403,7 @@ class Link(asyncio.Protocol):
             f"no answer within {self._answer_timeout_s:g} s",
             device=self._name,
             sent=text,
-            received=self.history.received_since_sent(),
+            received=self._doubtful_received,
             hint="the line is brought back in step before anything else is sent; an answer that still comes is dropped",
             exchanges=self.recent(),
         )

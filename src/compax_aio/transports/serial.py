@@ -24,7 +24,7 @@ if os.name == "posix":
 
     from .serial_line import SerialLine
 
-__all__ = ["PortInfo", "list_ports", "open_serial"]
+__all__ = ["PortInfo", "connect_on_base", "list_ports", "open_serial"]
 
 _FORM: Final = "serial:///dev/ttyUSB0?baudrate=9600 or serial://COM3"
 _OPTIONS: Final = ("baudrate", "bytesize", "parity", "stopbits", "rtscts", "xonxoff", "dsrdtr")

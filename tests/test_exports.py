@@ -1,0 +1,104 @@
+"""The public surface is a list, and the errors are one tree."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+import compax_aio
+from compax_aio import errors
+
+MODULES = sorted(
+    module.name
+    for module in pkgutil.walk_packages(compax_aio.__path__, "compax_aio.")
+    if not module.name.startswith("compax_aio.cli") and not module.name.endswith("__main__")
+)
+"""All modules but those of the command line, which needs an extra."""
+
+NOT_NEEDED = [
+    *("rich", "numpy", "matplotlib", "serialx", "textual", "prompt_toolkit", "cyclopts", "uvloop", "trustme"),
+    *("hypothesis", "pytest", "compax_aio.simulator", "compax_aio.cli", "serial", "serial_asyncio"),
+]
+
+
+def public_classes(module: ModuleType) -> list[type]:
+    return [each for each in vars(module).values() if isinstance(each, type) and each.__module__ == module.__name__]
+
+
+def test_what_the_package_offers_is_what_it_has() -> None:
+    offered = compax_aio.__all__
+    assert sorted(offered) == list(offered), "in the order in which people look"
+    assert len(set(offered)) == len(offered)
+    imported = {
+        name for name, value in vars(compax_aio).items() if name[0] != "_" and not isinstance(value, ModuleType)
+    }
+    assert imported == set(offered)
+
+
+def test_the_names_of_the_contract_are_offered() -> None:
+    """Section 5 of the design."""
+    assert {"connect", "Drive", "DriveGroup", "DriveSettings", "Move", "MoveResult"} <= set(compax_aio.__all__)
+    assert set(errors.__all__) <= set(compax_aio.__all__)
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_every_module_lists_what_it_offers(name: str) -> None:
+    module = importlib.import_module(name)
+    assert module.__doc__
+    if hasattr(module, "__path__") and not hasattr(module, "__all__"):
+        return  # a package that offers nothing itself
+    offered = module.__all__
+    assert list(offered) == sorted(offered, key=lambda each: (not each.isupper(), each[0].islower(), each))
+    assert all(hasattr(module, each) for each in offered)
+
+
+def test_the_types_of_the_package_are_shipped() -> None:
+    assert (Path(compax_aio.__path__[0]) / "py.typed").exists()
+
+
+def test_importing_the_package_imports_nothing_that_it_does_not_need() -> None:
+    """In a process of its own, for this one has imported all."""
+    code = f"import sys, compax_aio\nprint(*[name for name in {NOT_NEEDED!r} if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.split() == []
+
+
+# Errors ---------------------------------------------------------------------------------------------------------------
+
+
+def test_the_errors_are_one_tree_of_at_most_fifteen() -> None:
+    classes = public_classes(errors)
+    assert {each.__name__ for each in classes} == set(errors.__all__)
+    assert len(classes) <= 15
+    assert all(issubclass(each, errors.CompaxError) for each in classes)
+
+
+def test_nothing_that_users_call_has_an_exception_outside_the_tree() -> None:
+    for name in MODULES:
+        if name.startswith("compax_aio.simulator."):
+            continue  # the far end raises within itself
+        for each in public_classes(importlib.import_module(name)):
+            assert not issubclass(each, BaseException) or name == "compax_aio.errors", each
+
+
+def test_errors_that_programmers_know_are_what_they_know() -> None:
+    assert issubclass(errors.InvalidCommandError, ValueError)
+    assert issubclass(errors.MoveActiveError, errors.MoveError)
+    assert issubclass(errors.ConnectionLostError, errors.TransportError)
+    assert not issubclass(errors.AnswerTimeoutError, TimeoutError), "asyncio.timeout() around a call must stay apart"
+
+
+def test_an_error_says_where_what_and_what_to_do() -> None:
+    error = errors.CommandRejectedError(
+        "the drive rejected it", device="x", sent="PA1", received="E92", hint="await it", code=92, exchanges=("a",)
+    )
+    assert str(error) == "x: the drive rejected it; sent 'PA1'; received 'E92'; await it"
+    assert (error.what, error.code, error.exchanges) == ("the drive rejected it", 92, ("a",))
+    assert str(errors.CompaxError("nothing more")) == "nothing more"
+    assert str(errors.CompaxError("nothing", sent="", received="")) == "nothing; sent ''; received ''"
