@@ -52,8 +52,11 @@ class Stepper:
         self._at = at
         self._cancel = cancel
 
+    async def run(self, work: Coroutine[Any, Any, Any]) -> Any:
+        return await self._steps(work)
+
     @types.coroutine
-    def run(self, work: Coroutine[Any, Any, Any]) -> Generator[Any, Any, Any]:
+    def _steps(self, work: Coroutine[Any, Any, Any]) -> Generator[Any, Any, Any]:
         task = asyncio.current_task()
         assert task is not None
         resume: Callable[[], Any] = lambda: work.send(None)  # noqa: E731
@@ -160,9 +163,7 @@ class Run:
         assert not self.complaints, f"{where}: {self.complaints}"
 
     def _complain(self, _: object, context: dict[str, Any]) -> None:
-        # That a move was stopped is no news to the program that was cancelled over it.
-        if not isinstance(context.get("exception"), MoveStoppedError):
-            self.complaints.append(str(context))
+        self.complaints.append(str(context))
 
     async def _run(self, program: Callable[[], Coroutine[Any, Any, None]]) -> None:
         loop = asyncio.get_running_loop()

@@ -124,6 +124,7 @@ def check(
     elif isinstance(outcome, CommandRejectedError) or "was not taken" in str(outcome):
         assert not started, story
     elif not isinstance(outcome, MoveInDoubtError):
+        assert not started, story
         assert isinstance(outcome, AnswerTimeoutError | MoveTimeoutError), story
         assert outcome.sent is not None, story
 

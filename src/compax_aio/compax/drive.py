@@ -119,6 +119,11 @@ class Drive:
 
     async def _open(self, url: str) -> None:
         await self._line.link.open(url)
+        try:
+            await self._motion.look_around()
+        except BaseException:
+            await self._line.link.close()
+            raise
 
     def __repr__(self) -> str:
         return f"<Drive {self.name} {'open' if self.is_open else 'closed'}>"

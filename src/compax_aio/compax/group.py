@@ -80,6 +80,9 @@ class GroupMove(asyncio.Future[dict[str, MoveResult]]):
                     culprit.add_note(_outcome(axis, move))
             if not self.accepted.done():
                 self.accepted.set_exception(culprit)
+            if isinstance(culprit, MoveStoppedError):
+                # None has failed, all were stopped: whoever did that knows.
+                self.add_done_callback(fetch_error)
             self.set_exception(culprit)
         elif len(errors) < len(self.moves):
             self.cancel()
@@ -98,6 +101,10 @@ class DriveGroup:
     def __init__(self, **drives: Drive) -> None:
         if not drives:
             raise InvalidCommandError("a group has at least one drive")
+        if len(set(map(id, drives.values()))) < len(drives):
+            raise InvalidCommandError(
+                f"each axis of a group has a drive of its own, not {', '.join(drives)} the same one"
+            )
         self.drives = drives
 
     @staticmethod

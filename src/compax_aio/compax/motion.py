@@ -4,8 +4,18 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from typing import get_args
 
-from ..errors import CompaxError, MoveActiveError, MoveError, MoveInDoubtError, MoveTimeoutError
+from ..errors import (
+    CommandRejectedError,
+    CompaxError,
+    InvalidCommandError,
+    MoveActiveError,
+    MoveError,
+    MoveInDoubtError,
+    MoveTimeoutError,
+    UnexpectedAnswerError,
+)
 from .codecs import DriveStatus
 from .moves import Move, OnCancel, fetch_error
 from .observer import Observer
@@ -13,7 +23,7 @@ from .pursuit import Memory, Pursuit
 from .reports import Reports
 from .settings import DriveSettings
 from .stopping import Stop
-from .vocabulary import MovePlan
+from .vocabulary import MovePlan, check_number
 
 __all__ = ["Motion"]
 
@@ -63,7 +73,12 @@ class Motion:
             MoveActiveError: Another move runs.
             MoveInDoubtError: What became of the last one is unknown.
             MoveError: Points prepared for a move that never started would act on this one.
+            InvalidCommandError: *timeout_s* or *on_cancel* means nothing.
         """
+        if timeout_s is not None and not check_number("timeout_s", timeout_s) > 0:
+            raise InvalidCommandError(f"timeout_s must be above 0, not {timeout_s!r}")
+        if on_cancel not in get_args(OnCancel):
+            raise InvalidCommandError(f"on_cancel is 'stop' or 'detach', not {on_cancel!r}")
         self.check(plan)
         self._release()
         move = Move(self, plan, on_cancel)
@@ -87,13 +102,16 @@ class Motion:
             if self._is_active(pursuit.move):
                 self.begin_stop(error)
         except CompaxError as error:
+            # What is in doubt may be moving: leaving the block stops it.
+            self._has_untracked_motion |= isinstance(error, MoveInDoubtError) and pursuit.move.is_on_wire
             pursuit.move.fail(error)
         except asyncio.CancelledError:
             # Either the move was taken from here, or the event loop is ending: then the drive must not go on alone.
             if self._is_active(pursuit.move):
                 pursuit.move.cancel()
-                if self._stopping is not None:
-                    await asyncio.wait([self._stopping])
+            # Also where somebody else was quicker to stop it: the loop must not end before that is over.
+            if self._stopping is not None:
+                await asyncio.wait([self._stopping])
             raise
 
     def note_untracked(self, text: str) -> None:
@@ -136,7 +154,8 @@ class Motion:
 
     def comparator_reached(self, number: int) -> None:
         """Take a comparator's number that was just read."""
-        if self._active is not None:
+        # One that is passed on the ramp of a stop is not of the move that waits for it.
+        if self._active is not None and self._active.move.is_on_wire:
             self._active.move.note_comparator(number)
 
     def line_lost(self) -> None:
@@ -148,10 +167,20 @@ class Motion:
         """Read S1."""
         return await self._observer.line.position()
 
+    async def look_around(self) -> None:
+        """Find out whether somebody's motion runs already: the ``$`` that ends it is not one of ours."""
+        try:
+            status = await self._observer.read_status()
+        except (CommandRejectedError, UnexpectedAnswerError) as error:
+            _log.warning("%s does not say how it stands: %s", self.name, error)
+        else:
+            self._memory.messages_owed = int(status.command_active)
+
     async def reconcile(self) -> DriveStatus:
         """Read status and position, and end the doubt."""
         look = await self._observer.look()
         self._memory.doubt = None
+        self._has_untracked_motion &= look.status.command_active
         return look.status
 
     # Stopping -------------------------------------------------------------------------------------------------------
@@ -183,6 +212,7 @@ class Motion:
             fault = None if look.status.no_fault else await self._observer.read_error()
         except CompaxError as error:
             self._memory.doubt = f"a stop failed ({error.what})"
+            self._has_untracked_motion = True
             if pursuit is not None:
                 pursuit.move.fail(self._reports.in_doubt(pursuit.move, "it may still be moving, a stop failed", error))
             raise

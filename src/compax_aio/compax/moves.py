@@ -58,7 +58,8 @@ class Move(asyncio.Future[MoveResult]):
     A motion under way; awaiting it gives a :class:`MoveResult`, or raises why the target was not reached.
 
     Cancelling it (also by a time-out around it, a failing task group, Ctrl-C) stops the drive, unless it was made
-    with ``on_cancel="detach"``; then the drive goes on, unwatched.
+    with ``on_cancel="detach"``; then the drive goes on, unwatched. Cancelling somebody who awaits :attr:`accepted`, or
+    iterates over :meth:`positions`, cancels only that; leaving the drive's block stops the move all the same.
 
     Attributes:
         accepted: A future that is done when the drive's prompt came back, or raises why it did not.

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
+from typing import TypeVar
 
-from ..errors import CommandRejectedError, CompaxError, ConnectionLostError, UnexpectedAnswerError
+from ..errors import AnswerTimeoutError, CommandRejectedError, CompaxError, ConnectionLostError, UnexpectedAnswerError
 from ..link.contract import Lane
 from .codecs import DriveStatus, decode_error
 from .facts.device_errors import DeviceError
@@ -14,6 +15,8 @@ from .line import DriveLine
 from .settings import DriveSettings
 
 __all__ = ["Look", "Observer"]
+
+_Value = TypeVar("_Value")
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,10 +63,10 @@ class Observer:
         return status
 
     async def read_error(self) -> DeviceError | None:
-        """Read S30; None also where the drive does not say."""
+        """Read S30; None also where the drive does not say, or cannot be heard: the fault itself is known already."""
         try:
             return decode_error(await self.line.query("S30", Lane.CONTROL))
-        except (CommandRejectedError, UnexpectedAnswerError):
+        except (AnswerTimeoutError, CommandRejectedError, UnexpectedAnswerError):
             return None
 
     async def look(self) -> Look:
@@ -75,13 +78,13 @@ class Observer:
             position = None
         return Look(status, position)
 
-    async def look_patiently(self) -> Look:
-        """Look, again and again if need be; raise the last error when it has failed for ``in_doubt_after_s``."""
+    async def patiently(self, read: Callable[[], Awaitable[_Value]]) -> _Value:
+        """Read, again and again if need be; raise the last error when it has failed for ``in_doubt_after_s``."""
         loop = asyncio.get_running_loop()
         give_up_at = loop.time() + self._settings.in_doubt_after_s
         while True:
             try:
-                return await self.look()
+                return await read()
             except ConnectionLostError:
                 raise
             except CompaxError:
@@ -95,6 +98,12 @@ class Observer:
             return await self.line.number(2, Lane.CONTROL)
         except (CommandRejectedError, UnexpectedAnswerError):
             return await self.line.position(Lane.CONTROL)
+
+    async def standing_position(self) -> float:
+        """Read where a relative move begins: S2, unless the axis stands elsewhere, as after a stop; then S1."""
+        commanded = await self.commanded_position()
+        actual = await self.line.position(Lane.CONTROL)
+        return commanded if self.is_near(commanded, actual) else actual
 
     def is_near(self, position: float | None, target: float | None) -> bool:
         """Whether two positions are the same but for a few of the last decimals."""

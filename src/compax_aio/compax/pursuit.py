@@ -9,10 +9,18 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, TypeVar
 
-from ..errors import AnswerTimeoutError, CommandRejectedError, CompaxError, ConnectionLostError, MoveInDoubtError
+from ..errors import (
+    AnswerTimeoutError,
+    CommandRejectedError,
+    CompaxError,
+    ConnectionLostError,
+    MoveActiveError,
+    MoveInDoubtError,
+)
 from ..link.contract import Lane, TurnOver
 from .facts.line import POSITION_REACHED_SIGN
 from .moves import Move
@@ -26,8 +34,11 @@ __all__ = ["Memory", "Pursuit"]
 
 _log = logging.getLogger(__name__)
 
+_Value = TypeVar("_Value")
+
 _POLL_GROWTH: Final = 1.5
 _LOOKS_UNTIL_UNCLEAR_COUNTS: Final = 3
+_SAMPLES: Final = 2
 
 
 @dataclass(slots=True)
@@ -38,6 +49,8 @@ class Memory:
     """Commands with ``$`` that were sent, less the ``$`` that came."""
     points_prepared: int = 0
     """Speed steps and comparators that the drive holds for a move that was not started."""
+    messages_without_prompt: int = 0
+    """Commands in a row whose ``$`` came without the prompt that others send first."""
     doubt: str | None = None
     """Why the drive takes no motion until :meth:`Drive.reconcile`."""
 
@@ -63,6 +76,9 @@ class Pursuit:
         self._loop = asyncio.get_running_loop()
         self._wake = asyncio.Event()
         self._message_came = False
+        self._owes_message = False
+        self._was_seen_active = False
+        self._homed_before: Look | None = None
         self._reply: asyncio.Future[TurnOver] | None = None
 
     async def carry_out(self) -> None:
@@ -82,7 +98,7 @@ class Pursuit:
         """Find out where the move begins, as far as it matters, and say everything but the motion itself."""
         plan = self.move.plan
         if plan.distance is not None:
-            self.move.target = round(await self._observer.commanded_position() + plan.distance, self._settings.decimals)
+            self.move.target = round(await self._observer.standing_position() + plan.distance, self._settings.decimals)
         for text in plan.settings_lines:
             await self._line.command(text, Lane.MOTION)
         for text in plan.point_lines:
@@ -96,7 +112,8 @@ class Pursuit:
     async def _send(self) -> None:
         """Put the motion on the wire, once, and return when it is known to be accepted."""
         plan = self.move.plan
-        was_homed = plan.finds_machine_zero and (await self._observer.read_status()).machine_zero_approached
+        if plan.finds_machine_zero:
+            await self._look_before_homing()
         owes_message = plan.may_ask_for_message and self._line.protocol.message_form is not MessageForm.FINAL_ONLY
         text = plan.motion + POSITION_REACHED_SIGN if owes_message else plan.motion
 
@@ -104,6 +121,7 @@ class Pursuit:
             self.move.note_sent(text)
             self._memory.points_prepared = 0
             self._memory.messages_owed += owes_message
+            self._owes_message = owes_message
 
         self._reply = self._line.exchange(text, Lane.MOTION, on_sent)
         try:
@@ -111,7 +129,7 @@ class Pursuit:
         except AnswerTimeoutError as error:
             if not self.move.is_on_wire:
                 raise
-            await self._find_out(error, was_homed=was_homed)
+            await self._find_out(error)
             return
         if isinstance(outcome, Acknowledged):
             self.move.note_accepted()
@@ -121,9 +139,22 @@ class Pursuit:
             self._memory.messages_owed -= owes_message
             self._memory.points_prepared = len(plan.point_lines)
             raise refusal
-        await self._find_out(refusal, was_homed=was_homed)
+        await self._find_out(refusal)
 
-    async def _find_out(self, error: CompaxError, *, was_homed: bool) -> None:
+    async def _look_before_homing(self) -> None:
+        """Take note of what could be mistaken for its success: machine zero had been approached before."""
+        look = await self._observer.look()
+        if look.status.command_active:
+            raise MoveActiveError(
+                "somebody else moves this drive, so home() was not sent",
+                device=self._line.name,
+                received=look.as_sent,
+                hint="wait or stop() first; the drive would answer E92 (UG p. 162, 209)",
+            )
+        if look.status.machine_zero_approached:
+            self._homed_before = look
+
+    async def _find_out(self, error: CompaxError) -> None:
         """
         Let the drive's status decide whether a motion arrived whose answer did not; it is never sent again.
 
@@ -133,9 +164,11 @@ class Pursuit:
         """
         look = await self._look(error)
         status = look.status
+        self._was_seen_active |= status.command_active
         if not status.no_fault:
+            self._points_may_be_left()
             raise self._reports.fault(self.move, look, await self._observer.read_error())
-        if not status.command_active and not self._message_came and not await self._was_taken(look, error, was_homed):
+        if not status.command_active and not self._message_came and not await self._was_taken(look, error):
             self._memory.points_prepared = len(self.move.plan.point_lines)
             error.hint = (
                 "the drive's status shows that it was not taken: it stands at "
@@ -144,19 +177,19 @@ class Pursuit:
             raise error
         self.move.note_accepted()
 
-    async def _was_taken(self, look: Look, error: CompaxError, was_homed: bool) -> bool:
+    async def _was_taken(self, look: Look, error: CompaxError) -> bool:
         """Tell from a drive that stands still whether it has carried out the motion."""
         status = look.status
         if self.move.plan.finds_machine_zero:
-            if status.machine_zero_approached and was_homed:
+            if status.machine_zero_approached and self._homed_before:
                 raise self._doubt("machine zero had been approached before, so the status cannot tell", error)
             return status.machine_zero_approached
-        commanded = await self._observer.commanded_position()
-        if self._is_at_target(look.position) or self._is_at_target(commanded):
+        if self._is_at_target(look.position):
             return True
         if status.idle_after_stop or status.stopped_by_input:
+            # The stop may be that of an earlier move, even of one to the same target.
             raise self._doubt(f"the drive was stopped at {self._observer.written(look.position)}", error)
-        return False
+        return self._is_at_target(await self._learn(self._observer.commanded_position, error))
 
     # Watching it ----------------------------------------------------------------------------------------------------
 
@@ -166,7 +199,13 @@ class Pursuit:
         if not self.move.is_on_wire:
             return
         self._message_came = True
-        if owed == 1 and self._was_acknowledged_by_prompt() and not self._settings.verify_messages:
+        # A late one of an earlier move must not end a move that asked for none, as the search for machine zero.
+        if (
+            owed == 1
+            and self._owes_message
+            and self._was_acknowledged_by_prompt()
+            and not self._settings.verify_messages
+        ):
             self.move.finish("message", self._line.last_position)
         self._wake.set()
 
@@ -195,6 +234,7 @@ class Pursuit:
             look = await self._look(None)
             if self.move.done():
                 return
+            self._was_seen_active |= look.status.command_active
             verdict = self._judge(look)
             if verdict is Verdict.UNCLEAR:
                 unclear += 1
@@ -220,11 +260,14 @@ class Pursuit:
         self._wake.clear()
 
     def _judge(self, look: Look) -> Verdict:
-        return judge(
+        verdict = judge(
             look.status,
             is_at_target=self._is_at_target(look.position),
             finds_machine_zero=self.move.plan.finds_machine_zero,
         )
+        if verdict is Verdict.REACHED and self._may_be_of_an_earlier_search(look):
+            return Verdict.UNCLEAR
+        return verdict
 
     async def _second_opinion(self, look: Look) -> Verdict:
         """Judge a drive that stands, and whose status and position do not both say that it has arrived."""
@@ -232,11 +275,30 @@ class Pursuit:
             return Verdict.UNCLEAR
         if self._is_at_target(look.position):
             return Verdict.REACHED
-        if look.status.position_reached and self._is_at_target(await self._observer.commanded_position()):
+        if not look.status.position_reached:
+            return Verdict.UNCLEAR
+        if self._is_at_target(await self._learn(self._observer.commanded_position, None)):
             return Verdict.REACHED  # within the drive's own positioning window (P14, UG p. 117)
         return Verdict.UNCLEAR
 
+    def _may_be_of_an_earlier_search(self, look: Look) -> bool:
+        """Whether nothing shows that this search for machine zero began: "approached" may be of an earlier one."""
+        before = self._homed_before
+        return (
+            before is not None
+            and not self._was_seen_active
+            and self._observer.is_near(look.position, before.position)
+            and not self._observer.is_near(look.position, 0.0)
+        )
+
+    def _points_may_be_left(self) -> None:
+        """Take note that a motion of which nothing was seen may not have used up its points."""
+        if not self._was_seen_active:
+            self._memory.points_prepared = len(self.move.plan.point_lines)
+
     async def _conclude(self, look: Look, verdict: Verdict) -> None:
+        if verdict is not Verdict.REACHED:
+            self._points_may_be_left()
         if verdict is Verdict.FAULT:
             raise self._reports.fault(self.move, look, await self._observer.read_error())
         if verdict is Verdict.STOPPED:
@@ -255,9 +317,12 @@ class Pursuit:
             self.move.fail(fault or reason or self._reports.stopped(self.move, look))
 
     def _learn_message_form(self) -> None:
-        """Do without ``$`` from now on if it was the drive's only answer: its line is blocked until then."""
+        """Do without ``$`` from now on if it is the drive's only answer: its line is blocked until then."""
         protocol = self._line.protocol
-        if protocol.message_form is MessageForm.UNKNOWN and self._message_came:
+        if protocol.message_form is not MessageForm.UNKNOWN or not self._message_came:
+            return
+        self._memory.messages_without_prompt += 1
+        if self._memory.messages_without_prompt >= _SAMPLES:  # one alone may have lost its prompt
             protocol.message_form = MessageForm.FINAL_ONLY
             _log.info("%s sends no prompt before '$': its moves are confirmed by status now", self._line.name)
 
@@ -267,8 +332,11 @@ class Pursuit:
         return self._observer.is_near(position, self.move.target)
 
     async def _look(self, cause: CompaxError | None) -> Look:
+        return await self._learn(self._observer.look, cause)
+
+    async def _learn(self, read: Callable[[], Awaitable[_Value]], cause: CompaxError | None) -> _Value:
         try:
-            return await self._observer.look_patiently()
+            return await self._observer.patiently(read)
         except ConnectionLostError:
             raise
         except CompaxError as error:

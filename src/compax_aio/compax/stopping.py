@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from typing import Final
 
-from ..errors import AnswerTimeoutError, CommandRejectedError, CompaxError, MoveTimeoutError
+from ..errors import AnswerTimeoutError, CommandRejectedError, CompaxError, ConnectionLostError, MoveTimeoutError
 from ..link.contract import Lane, TurnOver
 from .observer import Look, Observer
 from .protocol import Acknowledged
@@ -83,15 +83,29 @@ class Stop:
             self._reply = self._send()
 
     async def _has_nothing_to_stop(self) -> bool:
-        status = await self._observer.read_status()
+        try:
+            status = await self._observer.read_status()
+        except ConnectionLostError:
+            raise
+        except CompaxError:
+            return False
         return not status.command_active and not status.program_running
 
     async def _until_standstill(self) -> Look:
         give_up_at = self._loop.time() + self._settings.standstill_timeout_s
         while True:
-            look = await self._observer.look()
+            try:
+                look = await self._observer.look()
+            except ConnectionLostError:
+                raise
+            except CompaxError:
+                # One answer lost is no reason to give up a stop that was acknowledged.
+                if self._loop.time() >= give_up_at:
+                    raise
+                continue
             status = look.status
-            if not status.command_active or status.idle_after_stop or not status.no_fault:
+            # A fault has a ramp of its own; without current nothing can be waited for.
+            if not status.command_active or status.idle_after_stop or not (status.no_fault or status.running):
                 return look
             if self._loop.time() >= give_up_at:
                 raise MoveTimeoutError(

@@ -24,6 +24,7 @@ __all__ = [
     "Comparator",
     "MovePlan",
     "SpeedStep",
+    "check_number",
     "plan_home",
     "plan_move_by",
     "plan_move_to",
@@ -154,7 +155,7 @@ def _settings_lines(
 ) -> tuple[str, ...]:
     lines = []
     if speed_percent is not None:
-        speed = _number("speed_percent", speed_percent)
+        speed = check_number("speed_percent", speed_percent)
         if not 0 < speed <= settings.speed_limit_percent or round(speed, SPEED_DECIMALS) == 0:
             raise InvalidCommandError(
                 f"speed_percent must be above 0 and at most {settings.speed_limit_percent:g}, not {speed_percent!r}",
@@ -176,7 +177,7 @@ def _point_lines(
     lines = []
     for each in steps:
         step = each if isinstance(each, SpeedStep) else _of_tuple(SpeedStep, each)
-        speed = _number("speed_percent of a speed step", step.speed_percent)
+        speed = check_number("speed_percent of a speed step", step.speed_percent)
         if speed != int(speed) or not 0 < speed <= settings.speed_limit_percent:
             raise InvalidCommandError(
                 f"the speed of a speed step is a whole number from 1 to {settings.speed_limit_percent:g} (UG p. 101), "
@@ -218,14 +219,14 @@ def _point_distance(distance: float, settings: DriveSettings) -> str:
 
 
 def _position(what: str, value: float, settings: DriveSettings) -> float:
-    number = round(_number(what, value), settings.decimals)
+    number = round(check_number(what, value), settings.decimals)
     if abs(number) > MAX_POSITION:
         raise InvalidCommandError(f"{what} must be within ±{MAX_POSITION:,.0f} {settings.unit}, not {value!r}")
     return number + 0.0  # no -0.0
 
 
 def _ramp_time(what: str, value: int) -> int:
-    number = _number(what, value)
+    number = check_number(what, value)
     if number != int(number) or not 0 <= number <= MAX_ACCELERATION_TIME_MS:
         raise InvalidCommandError(
             f"{what} must be a whole number of milliseconds from 0 to {MAX_ACCELERATION_TIME_MS} (IBS p. 48), "
@@ -234,7 +235,13 @@ def _ramp_time(what: str, value: int) -> int:
     return int(number)
 
 
-def _number(what: str, value: object) -> float:
+def check_number(what: str, value: object) -> float:
+    """
+    Return *value* as a float.
+
+    Raises:
+        InvalidCommandError: It is no number, or not finite; *what* names it.
+    """
     if isinstance(value, bool) or not (isinstance(value, Real | Decimal)):
         raise InvalidCommandError(f"{what} must be a number, not {value!r}")
     try:
