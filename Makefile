@@ -14,17 +14,19 @@ help:  ## say what there is
 demo: $(VENV)/demo.ready  ## three simulated drives, homed and moved at once, with live positions
 	@$(BIN)/python -m compax_aio.cli.demo
 
-test: $(VENV)/test.ready  ## all tests, with coverage
-	$(BIN)/python -m pytest --cov --cov-report=term
+test: $(VENV)/test.ready  ## all tests
+	$(BIN)/python -m pytest
 
-check: $(VENV)/check.ready  ## format, lint, types, import contracts, docs
+check: $(VENV)/check.ready  ## format, lint, types, import contracts, docs, and all tests with coverage
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/sphinx-build -q -W --keep-going -b html docs docs/_build/html
+	$(MAKE) docs
+	$(BIN)/python -m pytest --cov --cov-report=term
 
-docs: check  ## the documents, in docs/_build/html
+docs: $(VENV)/check.ready  ## the documents, in docs/_build/html
+	$(BIN)/sphinx-build -q -W --keep-going -b html docs docs/_build/html
 
 matrix:  ## all tests on every CPython from 3.11 up that this machine has
 	@$(PYTHON) .ci/matrix.py

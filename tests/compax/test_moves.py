@@ -215,13 +215,16 @@ async def test_a_drive_that_sends_nothing_but_the_message_is_confirmed_by_status
         result = await drive.move_to(100)
         assert result.confirmed_by == "status"
         assert far.position == 100
+        again = drive.move_to(50)
+        await again
+        assert again.sent == "PA50$", "one sample may have lost its prompt"
         assert drive.stats.timeouts == 0
         move = drive.move_to(1000)
         await move.accepted
         assert move.sent == "PA1000"
         await move
         assert far.position == 1000
-        assert motions(far) == ["POSA 100.00", "POSA 1000.00"]
+        assert motions(far) == ["POSA 100.00", "POSA 50.00", "POSA 1000.00"]
 
 
 async def test_a_long_move_of_a_drive_that_sends_nothing_but_the_message_is_accepted_by_its_status() -> None:
