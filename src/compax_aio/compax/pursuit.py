@@ -245,7 +245,7 @@ class Pursuit:
                 await self._conclude(look, verdict)
                 return
             unclear = 0
-            if look.position != position:
+            if look.position is None or look.position != position:  # where S1 cannot be read, no stall can be seen
                 position, moved_at = look.position, self._loop.time()
             elif self._loop.time() - moved_at >= self._settings.stall_timeout_s:
                 raise self._reports.stalled(self.move, look, self._settings.stall_timeout_s)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
-from typing import Protocol
+from typing import Protocol, cast
 
 from compax_aio.errors import TransportError
 
@@ -138,11 +138,11 @@ class Connection(asyncio.Protocol):
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Take the line, or hang up if it is taken."""
-        assert isinstance(transport, asyncio.Transport)
+        line = cast("asyncio.Transport", transport)  # those of uvloop are no subclasses
         if self._line.occupied:
-            transport.abort()
+            line.abort()
             return
-        self._transport = transport
+        self._transport = line
         self._connections.add(self)
         self._line.connect(self._send)
 
