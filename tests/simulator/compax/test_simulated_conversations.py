@@ -72,8 +72,8 @@ def test_leading_zeros_and_blanks_of_a_query_are_not_needed(terminal: Terminal, 
 @pytest.mark.parametrize(
     "line",
     [
-        "PA", "PA x", "PA 1e3", "PA 1,5", "PA nan", "PAPA 1", "XY", "S", "S99", "P3", "S1$", "SD 50$", "PA 1$$", "!?",
-        "PA 1!", "STOPS", "STOP 1", "OT O0", "OT O1", "OT 1=1", "GOTO 5", "PR 5 OT O1=2", "PR 5 SD", "PH 5", "$", "?",
+        "PA", "PA x", "PA 1e3", "PA 1,5", "PA nan", "PAPA 1", "XY", "S", "S99", "P251", "S1$", "SD 50$", "PA 1$$", "!?",
+        "PA 1!", "STOPS", "STOP 1", "OT O0", "OT O1", "OT 1=1", "GOTO X", "PR 5 OT O1=2", "PR 5 SD", "PH 5", "$", "?",
         "PR 5 OT O1=1$", "AL", "\x01S1", "S1\x7f", ">",
     ],
 )  # fmt: skip
@@ -365,9 +365,9 @@ def test_targets_outside_the_travel_range_are_refused() -> None:
         ("S8", "S008: 320.00"),
         ("S9", "S009: 0"), ("S10", "S010: 0"), ("S11", "S011: 0"), ("S12", "S012: 0.00"), ("S13", "S013: 0.00"),
         ("S18", "S018: 00 00 00 00 00 00 00 00"), ("S30", "S030: 0 0"),
-        ("P1", "P001: 0.00"), ("P2", "P002: 100.000"), ("P6", "P006: 250"), ("P10", "P010: 100"),
-        ("P11", "P011: 4000000.00"), ("P12", "P012: -4000000.00"), ("P14", "P014: 1.00"), ("P20", "P020: 0"),
-        ("P90", "P090: 1"),
+        ("P1", "P001: 0.000"), ("P2", "P002: 100.000"), ("P6", "P006: 250"), ("P10", "P010: 100"),
+        ("P11", "P011: 4000000.000"), ("P12", "P012: -4000000.000"), ("P14", "P014: 1.000"), ("P20", "P020: 0"),
+        ("P90", "P090: 1.000"),
     ],
 )  # fmt: skip
 def test_values_of_a_new_drive(terminal: Terminal, query: str, answer: str) -> None:

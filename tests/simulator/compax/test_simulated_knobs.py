@@ -99,7 +99,7 @@ def test_decimals() -> None:
     terminal = Terminal(decimals=3, position=1.2345, unit="inch")
     assert terminal.ask("S1") == "S001: 1.234"
     assert terminal.say("PA 1.235") == PROMPT
-    assert terminal.ask("P90") == "P090: 2"
+    assert terminal.ask("P90") == "P090: 2.000"
     assert Knobs.from_query({"unit": "inch"}).decimals == 3
     assert Knobs.from_query({"unit": "inch", "decimals": "2"}).decimals == 2
 

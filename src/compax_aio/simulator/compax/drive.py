@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from enum import Enum, auto
 from typing import Final
 
@@ -10,13 +10,13 @@ from compax_aio.compax.facts.line import COMMAND_END
 
 from ..line import Host
 from . import replies
+from .console import Console
+from .inputs import Inputs
 from .knobs import Knobs
-from .language import ExecuteStored, MoveBy, MoveHome, MoveTo, Query, Start, Statement, parse
 from .log import Log, LogKind
 from .machine import Machine, Message, MessageKind
 from .port import ReceivedLine, SerialPort
-from .readings import reading
-from .refusals import STORE_EMPTY, SYNTAX, RefusedError
+from .refusals import RefusedError
 
 __all__ = ["SimulatedDrive"]
 
@@ -73,11 +73,14 @@ class SimulatedDrive:
         self.served_by: Host | None = None
         self._machine = Machine(self.knobs, self.log)
         self._port = SerialPort(self.knobs)
+        self._console = Console(self._machine)
+        self._port.set_xonxoff(self._machine.xonxoff, 0.0)
+        self._machine.inputs.before_change = lambda: self._run(self._time(None))
         self._powered = True
         self._forget_conversation()
 
     def __repr__(self) -> str:
-        return f"<SimulatedDrive {self.name!r} at {self.position:g} {self.knobs.unit}>"
+        return f"<SimulatedDrive {self.name!r} at {self.position:g} {self._machine.unit}>"
 
     # The line
 
@@ -142,6 +145,29 @@ class SimulatedDrive:
         return dict(self._machine.outputs)
 
     @property
+    def inputs(self) -> Inputs:
+        """I1-I16, to be read and set: ``drive.inputs[7] = True``."""
+        return self._machine.inputs
+
+    @property
+    def program(self) -> Mapping[int, str]:
+        """The records that hold something else than END."""
+        return self._machine.memory.written
+
+    def load_program(self, records: Iterable[str], first: int = 1) -> None:
+        """
+        Write records from *first* on.
+
+        Raises:
+            ValueError: One of them is no record of a program.
+        """
+        for record, text in enumerate(records, first):
+            try:
+                self._machine.memory.write(record, text.upper(), self._machine.decimals)
+            except RefusedError as refused:
+                raise ValueError(f"N{record:03d}: {text!r} is refused: {refused}") from None
+
+    @property
     def fault(self) -> int | None:
         """The fault or warning that is present, as S30 tells it."""
         return self._machine.faults.present
@@ -149,7 +175,7 @@ class SimulatedDrive:
     @property
     def prepared_points(self) -> int:
         """How many speed steps and comparators wait for the next positioning."""
-        return self._machine.prepared_points
+        return self._machine.preparation.points
 
     # What tests do to it
 
@@ -267,7 +293,7 @@ class SimulatedDrive:
         self._answer_is_of_motion = False
         self._behind_answer: list[Message] = []
         self._delayed: list[tuple[float, Message]] = []
-        self._stored: Statement | None = None
+        self._console.forget()
 
     def _take_line(self) -> None:
         if self._turn is not _Turn.READY:
@@ -328,45 +354,11 @@ class SimulatedDrive:
         self.log.add(self._now, LogKind.LOST, text)
         return True
 
-    # What a line means
-
     def _execute_line(self) -> None:
-        self._answer_is_of_motion = False
+        suppressed = self._machine.errors_suppressed
         try:
-            self._answer = self._respond(self._line)
+            self._answer = self._console.respond(self._line, self._now)
         except RefusedError as refused:
-            self._answer = replies.error_text(refused.refusal, self.knobs)
-
-    def _respond(self, line: ReceivedLine) -> str | None:
-        """Carry out a line; return the answer, None for none."""
-        stored = self._stored
-        if self.knobs.store == "until_next_line":
-            self._stored = None
-        if line.too_long:
-            raise RefusedError(SYNTAX)
-        text = line.text.upper() if self.knobs.lower_case == "folded" else line.text
-        statement = parse(text, decimals=self.knobs.decimals)
-        if statement.stores:
-            self._stored = statement
-            return line.text if statement.echoes else ""
-        if isinstance(statement.instruction, ExecuteStored):
-            if stored is None:
-                raise RefusedError(STORE_EMPTY)
-            self._stored = None
-            statement = stored
-        if not statement.echoes:
-            return self._carry_out(statement)
-        # Whether an echoed line also answers is open (row 11): here the echo is the answer, unless it is refused.
-        if self.knobs.echo_sign == "echo_and_execute":
-            self._carry_out(statement)
-        return line.text
-
-    def _carry_out(self, statement: Statement) -> str | None:
-        instruction = statement.instruction
-        if isinstance(instruction, Query):
-            return reading(self._machine, instruction.kind, instruction.number, self._now)
-        self._machine.execute(instruction, statement.reports, self._now)
-        self._answer_is_of_motion = isinstance(instruction, MoveTo | MoveBy | MoveHome | Start)
-        if statement.reports and self.knobs.position_reached == "final_only":
-            return None
-        return ""
+            self._answer = replies.error_text(refused.refusal, self.knobs, suppressed=suppressed)
+        self._answer_is_of_motion = self._console.began_motion
+        self._port.set_xonxoff(self._machine.xonxoff, self._now)

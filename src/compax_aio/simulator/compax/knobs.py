@@ -81,6 +81,19 @@ class Knobs:
     """A command is received only after the last answer is out (UG p. 160): bytes before that are lost, not kept."""
     xonxoff: bool = False
     """P20 bit 0: Xoff from the host holds the output. Without it Xon and Xoff are characters like others."""
+    p20: Annotated[int, _Range(0, 255)] = 0
+    """P20 at the beginning, beside what ``xonxoff`` and ``error_style`` set; 16: binary commands (UG p. 166)."""
+
+    # Parameters
+
+    password: Literal["enforced", "off"] = "enforced"
+    """Parameters but P40-P49 are written only after GOTO 302 or GOTO 620; or always."""
+    vp: Literal["needed", "at_once"] = "needed"
+    """Written parameters but P40-P49 take effect at VP; or at once."""
+    parameter_reading: Literal["written", "valid"] = "written"
+    """A parameter that waits for VP reads as it was written; or as it is still valid."""
+    trailing_zeros: Literal["not_control", "all", "none"] = "not_control"
+    """All decimals that are stored in parameters but P40-P49, ``P002: 100.000``; in variables too; or in none."""
 
     # The line and the processor
 
@@ -88,6 +101,8 @@ class Knobs:
     """Byte timing of both directions, ten bits a byte; 0: bytes take no time."""
     answer_time_s: _Seconds = 0.002
     """From the CR of a line to its execution and the first byte of its answer (not documented)."""
+    record_time_s: Annotated[float, _Range(0.0001, 3600)] = 0.002
+    """What a record of the program takes (not documented)."""
     self_test_s: _Seconds = 0.0
     """After power-on, S16 bit 1 stays 0 and positioning is refused for so long (UG p. 209; the time is unknown)."""
 

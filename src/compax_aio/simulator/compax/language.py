@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -17,188 +18,53 @@ from compax_aio.compax.facts.limits import (
 )
 from compax_aio.compax.facts.line import ECHO_SIGN, EXECUTE_SIGN, POSITION_REACHED_SIGN, STORE_SIGN
 
+from .instructions import (
+    Acceleration,
+    Assign,
+    Break,
+    Deceleration,
+    ExecuteStored,
+    Instruction,
+    MakeValid,
+    MoveBy,
+    MoveHome,
+    MoveTo,
+    Nothing,
+    Operand,
+    Outputs,
+    Password,
+    Power,
+    PreparedOutput,
+    PreparedSpeed,
+    Query,
+    Quit,
+    SetPointer,
+    Single,
+    Speed,
+    Start,
+    Statement,
+    Stop,
+    WriteRecord,
+)
+from .parameters import CONTROL_PARAMETERS, FREE_VARIABLES
 from .refusals import NUMBER, SYNTAX, RefusedError
 
-__all__ = [
-    "Acceleration",
-    "Break",
-    "Deceleration",
-    "ExecuteStored",
-    "Instruction",
-    "MoveBy",
-    "MoveHome",
-    "MoveTo",
-    "Nothing",
-    "Outputs",
-    "Password",
-    "Power",
-    "PreparedOutput",
-    "PreparedSpeed",
-    "Query",
-    "Quit",
-    "Speed",
-    "Start",
-    "Statement",
-    "Stop",
-    "parse",
-]
+__all__ = ["OPERAND", "Context", "calculated", "instruction", "number", "operand", "parse"]
 
 
 @dataclass(frozen=True, slots=True)
-class MoveTo:
-    """POSA x."""
+class Context:
+    """What it takes to read a command."""
 
-    target: float
-
-
-@dataclass(frozen=True, slots=True)
-class MoveBy:
-    """POSR d."""
-
-    distance: float
+    decimals: int
+    """How many a position may have."""
+    value: Callable[[str, int], float] | None
+    """Says what ``.P40`` or ``.V5`` stands for now; None where only the form matters, as when a record is written."""
 
 
-@dataclass(frozen=True, slots=True)
-class MoveHome:
-    """POSA HOME."""
-
-
-@dataclass(frozen=True, slots=True)
-class PreparedSpeed:
-    """POSR d SPEED v."""
-
-    distance: float
-    percent: float
-
-
-@dataclass(frozen=True, slots=True)
-class PreparedOutput:
-    """POSR d OUTPUT Ox=y."""
-
-    distance: float
-    output: int
-    value: bool
-
-
-@dataclass(frozen=True, slots=True)
-class Speed:
-    """SPEED v."""
-
-    percent: float
-
-
-@dataclass(frozen=True, slots=True)
-class Acceleration:
-    """ACCEL v."""
-
-    time_ms: int
-
-
-@dataclass(frozen=True, slots=True)
-class Deceleration:
-    """ACCEL- v."""
-
-    time_ms: int
-
-
-@dataclass(frozen=True, slots=True)
-class Outputs:
-    """OUTPUT Ox=y..., one digit for each output from Ox on."""
-
-    first: int
-    values: tuple[bool, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Power:
-    """OUTPUT O0=0, 1 or 2."""
-
-    mode: int
-
-
-@dataclass(frozen=True, slots=True)
-class Stop:
-    """STOP."""
-
-
-@dataclass(frozen=True, slots=True)
-class Start:
-    """START."""
-
-
-@dataclass(frozen=True, slots=True)
-class Break:
-    """BREAK."""
-
-
-@dataclass(frozen=True, slots=True)
-class Quit:
-    """QUIT."""
-
-
-@dataclass(frozen=True, slots=True)
-class Password:
-    """GOTO 302, 270 or 620."""
-
-    number: int
-
-
-@dataclass(frozen=True, slots=True)
-class Query:
-    """S or P and a number."""
-
-    kind: str
-    number: int
-
-
-@dataclass(frozen=True, slots=True)
-class ExecuteStored:
-    """``!``."""
-
-
-@dataclass(frozen=True, slots=True)
-class Nothing:
-    """An empty line."""
-
-
-Instruction = (
-    MoveTo
-    | MoveBy
-    | MoveHome
-    | PreparedSpeed
-    | PreparedOutput
-    | Speed
-    | Acceleration
-    | Deceleration
-    | Outputs
-    | Power
-    | Stop
-    | Start
-    | Break
-    | Quit
-    | Password
-    | Query
-    | ExecuteStored
-    | Nothing
-)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Statement:
-    """One line: an instruction and its function signs."""
-
-    instruction: Instruction
-    reports: bool = False
-    """``$``"""
-    stores: bool = False
-    """``,``"""
-    echoes: bool = False
-    """``?``"""
-
-
-def parse(text: str, *, decimals: int) -> Statement:
+def parse(text: str, context: Context) -> Statement:
     """
-    Read a line without its CR, in upper case; *decimals* is how many a position may have.
+    Read a line without its CR, in upper case.
 
     Raises:
         RefusedError: It means nothing, or has a number that is out of range.
@@ -206,35 +72,82 @@ def parse(text: str, *, decimals: int) -> Statement:
     text = text.replace(" ", "")
     bare = text.rstrip(POSITION_REACHED_SIGN + STORE_SIGN + ECHO_SIGN)
     signs = text[len(bare) :]
-    instruction = _instruction(bare, decimals)
+    what = instruction(bare, context)
     reports = POSITION_REACHED_SIGN in signs
     # "$" belongs to POSA and POSR; an execute sign or an empty line stands alone (UG p. 160).
-    if reports and not isinstance(instruction, MoveTo | MoveBy | MoveHome):
+    if reports and not isinstance(what, MoveTo | MoveBy | MoveHome):
         raise RefusedError(SYNTAX)
-    if len(set(signs)) != len(signs) or (signs and isinstance(instruction, ExecuteStored | Nothing)):
+    if len(set(signs)) != len(signs) or (signs and isinstance(what, ExecuteStored | Nothing)):
         raise RefusedError(SYNTAX)
-    return Statement(instruction=instruction, reports=reports, stores=STORE_SIGN in signs, echoes=ECHO_SIGN in signs)
+    return Statement(instruction=what, reports=reports, stores=STORE_SIGN in signs, echoes=ECHO_SIGN in signs)
 
 
-def _instruction(text: str, decimals: int) -> Instruction:
+def instruction(text: str, context: Context) -> Instruction:
+    """
+    Read an instruction without blanks and function signs.
+
+    Raises:
+        RefusedError: It means nothing, or has a number that is out of range.
+    """
     if not text:
         return Nothing()
     if text == EXECUTE_SIGN:
         return ExecuteStored()
     if found := _QUERY.fullmatch(text):
         return Query(found["kind"], int(found["number"]))
+    if found := _ASSIGNMENT.fullmatch(text):
+        right = operand(found["right"]) if found["operator"] else None
+        return Assign(found["kind"], int(found["number"]), operand(found["left"]), found["operator"] or "", right)
+    if found := _RECORD.fullmatch(text):
+        return WriteRecord(int(found["number"]), found["text"] or found["bare"])
     for word, long in _WORDS:
         if text.startswith(word):
-            return _READERS[long](text[len(word) :], decimals)
+            return _READERS[long](text[len(word) :], context)
     raise RefusedError(SYNTAX)
 
 
-def _position(text: str, decimals: int) -> float:
-    return _number(text, decimals, -MAX_POSITION, MAX_POSITION)
+def operand(text: str) -> Operand:
+    """Read what ``OPERAND`` matches; parameters and variables may have a leading dot."""
+    name = text.removeprefix(".")
+    if name[0] in "PVS":
+        return Operand(name[0], int(name[1:]))
+    return Operand("", 0, float(text))
 
 
-def _number(text: str, decimals: int, low: float, high: float) -> float:
-    """Read a number of at most *decimals* from *low* to *high*; more decimals cannot be represented in the drive."""
+def calculated(operator: str, left: float, right: float) -> float:
+    """
+    Calculate; whole division and remainder go towards zero, a choice.
+
+    Raises:
+        RefusedError: Division by zero.
+    """
+    if operator in "/\\%" and right == 0:
+        raise RefusedError(NUMBER)
+    return _OPERATORS[operator](left, right)
+
+
+def _position(text: str, context: Context) -> float:
+    return number(text, context, context.decimals, -MAX_POSITION, MAX_POSITION)
+
+
+def number(text: str, context: Context, decimals: int, low: float, high: float) -> float:
+    """
+    Read a number of at most *decimals* from *low* to *high*; more decimals cannot be represented in the drive.
+
+    A parameter or variable in its place (UG p. 100, CAN p. 61) is rounded.
+
+    Raises:
+        RefusedError: It is no number, or not such a one.
+    """
+    if found := _IN_PLACE.fullmatch(text):
+        if int(found["number"]) not in (CONTROL_PARAMETERS if found["kind"] == "P" else FREE_VARIABLES):
+            raise RefusedError(SYNTAX)
+        if context.value is None:
+            return max(low, 1.0)
+        value = round(context.value(found["kind"], int(found["number"])), decimals) + 0.0
+        if not low <= value <= high:
+            raise RefusedError(NUMBER)
+        return value
     if not _NUMBER.fullmatch(text):
         raise RefusedError(SYNTAX)
     fraction = text.partition(".")[2].rstrip("0")
@@ -243,43 +156,43 @@ def _number(text: str, decimals: int, low: float, high: float) -> float:
     return float(text)
 
 
-def _posa(text: str, decimals: int) -> Instruction:
-    return MoveTo(_position(text, decimals))
+def _posa(text: str, context: Context) -> Instruction:
+    return MoveTo(_position(text, context))
 
 
-def _home(text: str, _: int) -> Instruction:
+def _home(text: str, _: Context) -> Instruction:
     return _alone(text, MoveHome())
 
 
-def _posr(text: str, decimals: int) -> Instruction:
+def _posr(text: str, context: Context) -> Instruction:
     point = _POINT.fullmatch(text)
     if point is None:
-        return MoveBy(_position(text, decimals))
+        return MoveBy(_position(text, context))
     # A distance from the start in the direction of travel, always positive (UG p. 101).
-    distance = _position(point["distance"], decimals)
+    distance = _position(point["distance"], context)
     if distance <= 0:
         raise RefusedError(NUMBER)
     if point["percent"] is not None:
-        return PreparedSpeed(distance, _number(point["percent"], 0, 1, MAX_SPEED_PERCENT))
+        return PreparedSpeed(distance, number(point["percent"], context, 0, 1, MAX_SPEED_PERCENT))
     output = int(point["output"])
     if output not in OUTPUT_NUMBERS:
         raise RefusedError(NUMBER)
     return PreparedOutput(distance, output, point["value"] == "1")
 
 
-def _speed(text: str, _: int) -> Instruction:
-    return Speed(_number(text, SPEED_DECIMALS, 0.001, MAX_SPEED_PERCENT))
+def _speed(text: str, context: Context) -> Instruction:
+    return Speed(number(text, context, SPEED_DECIMALS, 0.001, MAX_SPEED_PERCENT))
 
 
-def _acceleration(text: str, _: int) -> Instruction:
-    return Acceleration(int(_number(text, 0, 0, MAX_ACCELERATION_TIME_MS)))
+def _acceleration(text: str, context: Context) -> Instruction:
+    return Acceleration(int(number(text, context, 0, 0, MAX_ACCELERATION_TIME_MS)))
 
 
-def _deceleration(text: str, _: int) -> Instruction:
-    return Deceleration(int(_number(text, 0, 0, MAX_ACCELERATION_TIME_MS)))
+def _deceleration(text: str, context: Context) -> Instruction:
+    return Deceleration(int(number(text, context, 0, 0, MAX_ACCELERATION_TIME_MS)))
 
 
-def _output(text: str, _: int) -> Instruction:
+def _output(text: str, _: Context) -> Instruction:
     found = _OUTPUT.fullmatch(text)
     if found is None:
         raise RefusedError(SYNTAX)
@@ -291,19 +204,25 @@ def _output(text: str, _: int) -> Instruction:
     return Outputs(first, tuple(value == "1" for value in values))
 
 
-def _goto(text: str, _: int) -> Instruction:
-    if text not in {"302", "270", "620"}:
+def _goto(text: str, _: Context) -> Instruction:
+    if text in {"302", "270", "620"}:
+        return Password(int(text))
+    return SetPointer(_record_number(text))
+
+
+def _record_number(text: str) -> int:
+    if not re.fullmatch("[0-9]{1,3}", text):
         raise RefusedError(SYNTAX)
-    return Password(int(text))
+    return int(text)
 
 
-def _alone(text: str, instruction: Instruction) -> Instruction:
+def _alone(text: str, what: Instruction) -> Instruction:
     if text:
         raise RefusedError(SYNTAX)
-    return instruction
+    return what
 
 
-_READERS: Final[Mapping[str, Callable[[str, int], Instruction]]] = {
+_READERS: Final[Mapping[str, Callable[[str, Context], Instruction]]] = {
     "POSA": _posa,
     "POSA HOME": _home,
     "POSR": _posr,
@@ -316,6 +235,9 @@ _READERS: Final[Mapping[str, Callable[[str, int], Instruction]]] = {
     "BREAK": lambda text, _: _alone(text, Break()),
     "QUIT": lambda text, _: _alone(text, Quit()),
     "GOTO": _goto,
+    "SINGLE": lambda text, _: Single(_record_number(text)),
+    "VP": lambda text, _: _alone(text, MakeValid("VP")),
+    "VC": lambda text, _: _alone(text, MakeValid("VC")),
 }
 """How the rest of a line is read after the command word of that long form."""
 
@@ -327,8 +249,12 @@ _ALIASES: Final = {
     "ST": "START",
     "BR": "BREAK",
     "QT": "QUIT",
-    # Password (CAN p. 32); its place in the table of commands comes with the parameters.
+    # One record: the fieldbus can (CAN p. 69), how RS-232 says it is unknown. A placeholder.
+    "SINGLE": "SINGLE",
+    # Password (CAN p. 32); by analogy with the PLC interface (UG p. 158) also the pointer. VP, VC (UG p. 158).
     "GOTO": "GOTO",
+    "VP": "VP",
+    "VC": "VC",
 }
 
 _WORDS: Final = sorted(
@@ -343,9 +269,25 @@ def _forms(long: str) -> str:
 
 
 _NUMBER: Final = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)")
-_QUERY: Final = re.compile(r"(?P<kind>[SP])(?P<number>[0-9]{1,5})")
+_IN_PLACE: Final = re.compile(r"\.(?:(?P<kind>[PV])(?P<number>[0-9]{1,3}))")
+OPERAND: Final = r"(?:[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)|\.?[PVS][0-9]{1,3})"
+"""An operand of an assignment or comparison, as a regular expression."""
+_ASSIGNMENT: Final = re.compile(
+    rf"(?P<kind>[PV])(?P<number>[0-9]{{1,3}})=(?P<left>{OPERAND})(?:(?P<operator>[-+*/\\%])(?P<right>{OPERAND}))?"
+)
+_OPERATORS: Final[Mapping[str, Callable[[float, float], float]]] = {
+    "+": lambda left, right: left + right,
+    "-": lambda left, right: left - right,
+    "*": lambda left, right: left * right,
+    "/": lambda left, right: left / right,
+    "\\": lambda left, right: float(math.trunc(left / right)),
+    "%": math.fmod,
+}
+"""UG does not say them on the pages at hand; IBS p. 56 does."""
+_RECORD: Final = re.compile(r"N(?P<number>[0-9]{1,3})(?::(?P<text>.+)|(?P<bare>[^0-9:].*))")
+_QUERY: Final = re.compile(r"(?P<kind>[SPVN])(?P<number>[0-9]{1,5})")
 _POINT: Final = re.compile(
-    rf"(?P<distance>[^A-Z]+)(?:(?:{_forms('SPEED')})(?P<percent>.+)"
+    rf"(?P<distance>[^A-Z]+|\.[PV][0-9]+)(?:(?:{_forms('SPEED')})(?P<percent>.+)"
     rf"|(?:{_forms('OUTPUT')})O(?P<output>[0-9]{{1,2}})=(?P<value>[01]))"
 )
 _OUTPUT: Final = re.compile(r"O(?P<output>[0-9]{1,2})=(?P<values>[0-9]{1,8})")

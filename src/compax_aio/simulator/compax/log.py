@@ -35,6 +35,8 @@ class LogKind(StrEnum):
     """The axis stands after a fault or without power; the position."""
     OUTPUT = "output"
     """An output was set: ``O9=1``."""
+    PROGRAM = "program"
+    """The program: ``started N001``, ``stopped N009``, ``continued N009``, ``ended N013``, ``N005 refused: ...``."""
     FAULT = "fault"
     """A fault or warning came: ``E55``."""
     QUIT = "quit"

@@ -7,16 +7,23 @@ from enum import Enum
 from typing import Final
 
 from compax_aio.compax.facts.device_errors import FAULT_CODES
-from compax_aio.compax.facts.limits import MAX_PREPARED_POINTS
+from compax_aio.compax.facts.limits import POSITION_DECIMALS, POSITION_DECIMALS_INCH
 from compax_aio.compax.facts.line import POSITION_REACHED_SIGN
 
-from . import language as say
-from .axis import Axis, Comparator, ComparatorPassed, Move, MoveEnded, Outcome
+from . import instructions as say
+from .axis import Axis, ComparatorPassed, Move, MoveEnded, Outcome
 from .faults import FaultMemory
+from .inputs import Inputs
+from .interpreter import Interpreter
 from .knobs import Knobs
+from .language import Context, calculated
 from .log import Log, LogKind
-from .motion import SpeedStep, ramp
-from .refusals import FAULTED, MOVE_ACTIVE, POINTS_FULL, POWER_OFF, TRAVEL, RefusedError
+from .motion import ramp
+from .parameters import CONTROL_PARAMETERS, UNITS, Parameters
+from .preparation import Preparation
+from .program import RECORDS, Memory
+from .quantities import status_number
+from .refusals import FAULTED, MOVE_ACTIVE, NO_RECORD, PASSWORD, POWER_OFF, PROGRAM_RUNS, TRAVEL, Refusal, RefusedError
 
 __all__ = ["Machine", "Message", "MessageKind"]
 
@@ -49,10 +56,15 @@ class Machine:
     def __init__(self, knobs: Knobs, log: Log) -> None:
         self.knobs = knobs
         self.log = log
-        self.axis = Axis(knobs.position, knobs.following_error_factor)
+        self.axis: Axis = Axis(knobs.position, knobs.following_error_factor)
         self.faults = FaultMemory()
+        self.parameters = Parameters(knobs)
+        self.preparation = Preparation(knobs, self.parameters)
+        self.memory = Memory()
+        self.program: Interpreter = Interpreter(self, self.memory, knobs.record_time_s)
+        self.inputs = Inputs()
         self.homed = knobs.homed
-        self.target = knobs.position
+        self.target: float = knobs.position
         self.outputs = dict.fromkeys(range(1, 17), False)
         self.power_mode = 0
         """Set with OUTPUT O0: 0 energised, 1 off with the brake closed, 2 off with the brake open."""
@@ -60,15 +72,11 @@ class Machine:
         self.service_password = False
         self.position_reached = False
         self.idle_after_stop = False
-        self.cycles = 0
+        self.cycles: int = 0
         self._zero = 0.0 if knobs.homed else knobs.position + knobs.machine_zero
         self._self_test_until = 0.0
         self._stopped: Move | None = None
         self._continues = False
-        self._points: list[say.PreparedSpeed | say.PreparedOutput] = []
-        self.speed_percent = knobs.speed_percent
-        self.acceleration_ms = knobs.acceleration_ms
-        self.deceleration_ms: int | None = None
 
     # What it shows
 
@@ -87,9 +95,34 @@ class Machine:
         return self.faults.fault is None and now >= self._self_test_until
 
     @property
-    def prepared_points(self) -> int:
-        """How many speed steps and comparators wait for the next positioning."""
-        return len(self._points)
+    def unit(self) -> str:
+        """What positions are counted in, by P90."""
+        return UNITS[int(self.parameters[90])]
+
+    @property
+    def decimals(self) -> int:
+        """Of positions and distances: those of the knob, until P90 chooses another unit (UG p. 100)."""
+        if self.unit == self.knobs.unit:
+            return self.knobs.decimals
+        return POSITION_DECIMALS_INCH if self.unit == "inch" else POSITION_DECIMALS
+
+    @property
+    def xonxoff(self) -> bool:
+        """P20 bit 0."""
+        return bool(int(self.parameters[20]) & 1)
+
+    @property
+    def errors_suppressed(self) -> bool:
+        """P20 bit 1: no error in the answer."""
+        return bool(int(self.parameters[20]) & 2)
+
+    def is_ready_for_start(self, now: float) -> bool:
+        """Whether START would be heeded (CAN-S p. 28)."""
+        return self.is_ready(now) and not self.moving and self.program.ready_for_start
+
+    def context(self) -> Context:
+        """Return what it takes to read a command now."""
+        return Context(self.decimals, self.parameters.value)
 
     # What is done to it
 
@@ -113,6 +146,10 @@ class Machine:
                 self._stop(Outcome.BROKEN, now)
             case say.Start():
                 self._start(now)
+            case say.WriteRecord(record, text):
+                self.memory.write(record, text, self.decimals)
+            case say.SetPointer() | say.Single():
+                self._choose_record(instruction, now)
             case _:
                 self._set(instruction, now)
 
@@ -126,6 +163,7 @@ class Machine:
     def power_off(self, now: float) -> None:
         """Take the power away: the axis stands, and what is not kept is forgotten."""
         self.log.add(now, LogKind.POWER, "off")
+        self.program.break_off(now)
         if ended := self.axis.freeze(now):
             self._ended(ended, now)
 
@@ -141,16 +179,23 @@ class Machine:
         self.outputs = dict.fromkeys(self.outputs, False)
         self.power_mode = 0
         self._self_test_until = now + self.knobs.self_test_s
+        self.parameters.forget_written()
         self._default_settings()
 
     # What comes by itself
 
     def next_event_at(self) -> float | None:
         """Return when something happens by itself next."""
-        return self.axis.next_event_at()
+        return min(
+            (at for at in (self.axis.next_event_at(), self.program.next_event_at()) if at is not None), default=None
+        )
 
     def step(self, now: float) -> Message | None:
         """Let the next event, which must be due, happen; return what is to be said about it."""
+        axis_at, program_at = self.axis.next_event_at(), self.program.next_event_at()
+        if axis_at is None or (program_at is not None and program_at < axis_at):
+            self.program.step(now)
+            return None
         event = self.axis.step()
         if isinstance(event, MoveEnded):
             return self._ended(event, now)
@@ -176,6 +221,7 @@ class Machine:
         says = move.reports and (reached or self.knobs.position_reached_on_stop)
         if event.outcome is Outcome.STOPPED:
             self._stopped = replace(move, reports=move.reports and not says)
+        self.program.axis_stands(reached, now)
         if self._continues:
             self._start(now)
         return Message(MessageKind.POSITION_REACHED, POSITION_REACHED_SIGN) if says else None
@@ -195,26 +241,9 @@ class Machine:
         if self.power_mode != 0:
             raise RefusedError(POWER_OFF)
         homing = word == "POSA HOME"
-        if not homing and not self.knobs.travel_min <= target <= self.knobs.travel_max:
+        if not homing and not self.parameters[12] <= target <= self.parameters[11]:
             raise RefusedError(TRAVEL)
-        # Preparatory commands are cancelled by finding machine zero (UG p. 101).
-        steps, comparators = ((), ()) if homing else self._taken_points()
-        self._points.clear()
-        nominal = self.knobs.nominal_speed
-        braking_ms = self.acceleration_ms if self.deceleration_ms is None else self.deceleration_ms
-        move = Move(
-            word=word,
-            origin=self.axis.setpoint(now),
-            target=target,
-            speed=nominal * self.speed_percent / 100,
-            acceleration=ramp(nominal, self.acceleration_ms),
-            deceleration=ramp(nominal, braking_ms),
-            steps=steps,
-            comparators=comparators,
-            signed=reports,
-            reports=reports and (self.knobs.position_reached_on_home or not homing),
-            homing=homing,
-        )
+        move = self.preparation.move(word, self.axis.setpoint(now), target, reports)
         self.target = target
         self.cycles += 1
         if homing:
@@ -228,53 +257,66 @@ class Machine:
         self.log.add(now, kind, f"{move.word} {self._written(move.target)}")
         self.axis.start(move, now)
 
-    def _prepare(self, point: say.PreparedSpeed | say.PreparedOutput) -> None:
-        if len(self._points) >= MAX_PREPARED_POINTS:
-            raise RefusedError(POINTS_FULL)
-        self._points.append(point)
-
-    def _taken_points(self) -> tuple[tuple[SpeedStep, ...], tuple[Comparator, ...]]:
-        """Turn the prepared points into steps and comparators, the latter numbered in programming order."""
-        steps: list[SpeedStep] = []
-        comparators: list[Comparator] = []
-        for place, point in enumerate(self._points, 1):
-            if isinstance(point, say.PreparedSpeed):
-                steps.append(SpeedStep(point.distance, self.knobs.nominal_speed * point.percent / 100))
-            else:
-                number = place if self.knobs.comparator_numbering == "points" else len(comparators) + 1
-                comparators.append(Comparator(number, point.distance, point.output, point.value))
-        return tuple(steps), tuple(comparators)
-
     def _stop(self, outcome: Outcome, now: float) -> None:
         # BREAK and faults also end what STOP has stopped; a fault is not made milder by a later STOP.
         self._continues = False
-        if outcome is not Outcome.STOPPED:
+        if outcome is Outcome.STOPPED:
+            self.program.stop(now)
+            self.idle_after_stop |= self.program.paused and not self.moving
+        else:
             self._stopped = None
+            (self.program.break_off if outcome is Outcome.BROKEN else self.program.error)(now)
         if self.axis.outcome is Outcome.FAULT or (self.axis.outcome is Outcome.BROKEN and outcome is Outcome.STOPPED):
             return
-        self.axis.stop(now, ramp(self.knobs.nominal_speed, self.knobs.stop_ramp_ms), outcome)
+        self.axis.stop(now, ramp(self.knobs.nominal_speed, self.parameters[10]), outcome)
 
     def _start(self, now: float) -> None:
-        # Without a stopped positioning START goes to the program memory, where N001 holds END (UG p. 162).
-        if self.moving:
+        if self.moving and self.axis.outcome is not Outcome.REACHED:
             self._continues = self.axis.outcome is Outcome.STOPPED
-        elif self._stopped is not None:
+        elif self._stopped is None:
+            # Without a stopped positioning START goes to the program memory (UG p. 162).
+            self.program.start(now)
+        else:
             if self.power_mode != 0:
                 raise RefusedError(POWER_OFF)
             self._run(self._stopped, LogKind.MOTION_CONTINUED, now)
+            if self.program.paused:
+                self.program.start(now)
+
+    # The program
+
+    def program_event(self, text: str, now: float) -> None:
+        """Note what the program does."""
+        self.log.add(now, LogKind.PROGRAM, text)
+
+    def program_failed(self, refusal: Refusal, now: float) -> None:
+        """Let a record that was refused end the program, and show its code as a warning; a choice."""
+        self.faults.came(refusal.code)
+        self.log.add(now, LogKind.FAULT, f"E{refusal.code}")
+        self.program.error(now)
+
+    def _choose_record(self, instruction: say.SetPointer | say.Single, now: float) -> None:
+        if instruction.record not in RECORDS:
+            raise RefusedError(NO_RECORD)
+        if self.program.running or self.program.paused:
+            raise RefusedError(PROGRAM_RUNS)
+        if isinstance(instruction, say.Single):
+            self.program.start(now, only=instruction.record)
+        else:
+            self.program.pointer = instruction.record
 
     # The rest
 
     def _set(self, instruction: say.Instruction, now: float) -> None:
         match instruction:
             case say.PreparedSpeed() | say.PreparedOutput():
-                self._prepare(instruction)
+                self.preparation.prepare(instruction)
             case say.Speed(percent):
-                self.speed_percent = percent
+                self.preparation.speed_percent = percent
             case say.Acceleration(time_ms):
-                self.acceleration_ms = time_ms
+                self.preparation.acceleration_ms = time_ms
             case say.Deceleration(time_ms):
-                self.deceleration_ms = time_ms
+                self.preparation.deceleration_ms = time_ms
             case say.Outputs(first, values):
                 for number, value in enumerate(values, first):
                     self._set_output(number, value, now)
@@ -284,14 +326,40 @@ class Machine:
                 self._set_password(number)
             case say.Quit():
                 self._quit(now)
-            case _:  # an empty line does nothing
+            case _:
+                self._configure(instruction, now)
+
+    def _configure(self, instruction: say.Instruction, now: float) -> None:
+        match instruction:
+            case say.Assign():
+                self._assign(instruction, now)
+            case say.MakeValid("VP"):
+                self.parameters.make_valid()
+            case _:  # an empty line does nothing; nor does VC, of which only the name is known
                 pass
 
+    def operand(self, operand: say.Operand, now: float) -> float:
+        """
+        Return the number that an operand stands for.
+
+        Raises:
+            RefusedError: There is no such value.
+        """
+        if operand.kind == "S":
+            return status_number(self, operand.number, now)
+        return self.parameters.value(operand.kind, operand.number) if operand.kind else operand.value
+
+    def _assign(self, assign: say.Assign, now: float) -> None:
+        protected = assign.kind == "P" and assign.number not in CONTROL_PARAMETERS
+        if protected and self.knobs.password == "enforced" and not (self.password or self.service_password):
+            raise RefusedError(PASSWORD)
+        value = self.operand(assign.left, now)
+        if assign.right is not None:
+            value = calculated(assign.operator, value, self.operand(assign.right, now))
+        self.parameters.write(assign.kind, assign.number, value)
+
     def _default_settings(self) -> None:
-        self.speed_percent = self.knobs.speed_percent
-        self.acceleration_ms = self.knobs.acceleration_ms
-        self.deceleration_ms = None
-        self._points.clear()
+        self.preparation.forget()
         self._stopped = None
         self._continues = False
 
@@ -319,4 +387,4 @@ class Machine:
             self.service_password = True
 
     def _written(self, position: float) -> str:
-        return f"{round(position, self.knobs.decimals) + 0.0:.{self.knobs.decimals}f}"
+        return f"{round(position, self.decimals) + 0.0:.{self.decimals}f}"

@@ -33,7 +33,7 @@ class SerialPort:
 
     def __init__(self, knobs: Knobs) -> None:
         self._byte_time_s = _BITS_A_BYTE / knobs.baudrate if knobs.baudrate else 0.0
-        self._xonxoff = knobs.xonxoff
+        self._xonxoff = False
         self._truncates = knobs.long_line == "truncate"
         self._one_line = knobs.ready_after_answer
         self.reset()
@@ -80,6 +80,13 @@ class SerialPort:
             else:
                 self._too_long = True
         return None
+
+    def set_xonxoff(self, on: bool, now: float) -> None:
+        """Heed Xon and Xoff from now on, or no more; output that Xoff holds then goes."""
+        self._xonxoff = on
+        if not on and self._held:
+            self._held = False
+            self._depart(now)
 
     def make_room(self) -> None:
         """Receive again, after a line has been answered; matters only to a drive that takes one line at a time."""

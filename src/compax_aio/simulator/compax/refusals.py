@@ -10,9 +10,13 @@ from compax_aio.compax.facts.certainty import Certainty
 __all__ = [
     "FAULTED",
     "MOVE_ACTIVE",
+    "NESTING",
+    "NO_RECORD",
     "NUMBER",
+    "PASSWORD",
     "POINTS_FULL",
     "POWER_OFF",
+    "PROGRAM_RUNS",
     "REFUSALS",
     "STORE_EMPTY",
     "SYNTAX",
@@ -32,6 +36,10 @@ class Refusal:
     certainty: Certainty = Certainty.PLACEHOLDER
 
 
+PROGRAM_RUNS: Final = Refusal(86, "program running")
+NESTING: Final = Refusal(87, "wrong nesting")
+NO_RECORD: Final = Refusal(88, "no such record")
+PASSWORD: Final = Refusal(89, "password needed")
 SYNTAX: Final = Refusal(90, "syntax error")
 NUMBER: Final = Refusal(91, "number out of range")
 MOVE_ACTIVE: Final = Refusal(92, "command active", Certainty.DOCUMENTED)
@@ -41,7 +49,20 @@ POINTS_FULL: Final = Refusal(95, "too many points")
 STORE_EMPTY: Final = Refusal(96, "nothing stored")
 POWER_OFF: Final = Refusal(97, "power stage off")
 
-REFUSALS: Final = (SYNTAX, NUMBER, MOVE_ACTIVE, TRAVEL, FAULTED, POINTS_FULL, STORE_EMPTY, POWER_OFF)
+REFUSALS: Final = (
+    PROGRAM_RUNS,
+    NESTING,
+    NO_RECORD,
+    PASSWORD,
+    SYNTAX,
+    NUMBER,
+    MOVE_ACTIVE,
+    TRAVEL,
+    FAULTED,
+    POINTS_FULL,
+    STORE_EMPTY,
+    POWER_OFF,
+)
 """E92 is in UG p. 209; 98 and 99 are left out because they are marks of the error history."""
 
 

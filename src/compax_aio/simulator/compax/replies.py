@@ -21,17 +21,13 @@ def answer(text: str) -> bytes:
     return text.encode("latin-1") + PROMPT
 
 
-def error_text(refusal: Refusal, knobs: Knobs) -> str | None:
-    """Return what is answered to a refused line; None for nothing, not even a prompt."""
-    match knobs.error_style:
-        case "code":
-            return f"E{refusal.code}"
-        case "text":
-            return f"E{refusal.code} {refusal.text}"[:MAX_LINE_LENGTH]
-        case "prompt_only":
-            return ""
-        case "silent":
-            return None
+def error_text(refusal: Refusal, knobs: Knobs, *, suppressed: bool) -> str | None:
+    """Return what is answered to a refused line, *suppressed* by P20 or not; None for not even a prompt."""
+    if suppressed:
+        return None if knobs.error_style == "silent" else ""
+    if knobs.error_style == "text":
+        return f"E{refusal.code} {refusal.text}"[:MAX_LINE_LENGTH]
+    return f"E{refusal.code}"
 
 
 def message(what: Message, knobs: Knobs) -> bytes:

@@ -1,0 +1,144 @@
+"""Parameters P1-P250 and variables: how finely each is stored, what has been written, and what is valid."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+from compax_aio.compax.facts.limits import MAX_ACCELERATION_TIME_MS, MAX_POSITION, MAX_SPEED_PERCENT
+
+from .knobs import Knobs
+from .refusals import NUMBER, SYNTAX, RefusedError
+
+__all__ = ["CONTROL_PARAMETERS", "FREE_VARIABLES", "UNITS", "VARIABLE_DECIMALS", "Parameters", "stored_decimals"]
+
+_NUMBERS: Final = range(1, 251)
+"""P1-P250 (IBS p. 24)."""
+
+CONTROL_PARAMETERS: Final = range(40, 50)
+"""P40-P49, free for programs (UG p. 100); here they need neither password nor VP."""
+
+FREE_VARIABLES: Final = range(1, 40)
+"""V1-V39 (UG p. 100)."""
+
+_VARIABLES: Final = (*FREE_VARIABLES, *range(50, 71))
+"""V50-V70 belong to the cam controller (UG p. 104) and are only kept here."""
+
+VARIABLE_DECIMALS: Final = 3
+"""Unknown; as P40-P49, a placeholder."""
+
+_STORED_DECIMALS: Final = (
+    (5, 3), (10, 0), (16, 3), (20, 0), (22, 6), (29, 0), (34, 3), (36, 6), (49, 3), (72, 0), (99, 3), (186, 0),
+    (196, 3), (250, 0),
+)  # fmt: skip
+"""Last parameter of each range, and the decimals of its stored resolution (IBS p. 24, CAN p. 33)."""
+
+UNITS: Final = ("increments", "mm", "inch", "degree")
+"""P90 is the place in this list; the real coding stands on a page that was not available: a placeholder."""
+
+_LARGEST: Final = 8_388_607
+"""Of a parameter without known limits, and of a variable; 24 bits and sign, as P156-P158 have (UG p. 140)."""
+
+_LIMITS: Final[Mapping[int, tuple[float, float]]] = {
+    2: (0.001, MAX_SPEED_PERCENT),
+    6: (0, MAX_ACCELERATION_TIME_MS),
+    10: (0, MAX_ACCELERATION_TIME_MS),
+    11: (-MAX_POSITION, MAX_POSITION),
+    12: (-MAX_POSITION, MAX_POSITION),
+    14: (0, MAX_POSITION),
+    20: (0, 255),
+    90: (0, len(UNITS) - 1),
+}
+"""Those of the commands that set the same thing; the manual's own parameter list was not available."""
+
+
+class Parameters:
+    """
+    What stands in the parameters and variables.
+
+    A written parameter other than P40-P49 waits for VP, unless the knob ``vp`` says that it is not needed. Numbers
+    are rounded to what can be stored. A parameter of which nothing is known begins at 0, a placeholder.
+    """
+
+    def __init__(self, knobs: Knobs) -> None:
+        self._at_once = knobs.vp == "at_once"
+        self._shows_valid = knobs.parameter_reading == "valid"
+        self._valid = {**dict.fromkeys(_NUMBERS, 0.0), **_first_values(knobs)}
+        self._written: dict[int, float] = {}
+        self._variables = dict.fromkeys(_VARIABLES, 0.0)
+
+    def __getitem__(self, number: int) -> float:
+        """Return the valid value of a parameter."""
+        return self._valid[number]
+
+    def value(self, kind: str, number: int) -> float:
+        """
+        Return what ``P40`` or ``V5`` stands for in a command.
+
+        Raises:
+            RefusedError: There is none.
+        """
+        values = self._valid if kind == "P" else self._variables
+        if number not in values:
+            raise RefusedError(SYNTAX)
+        return values[number]
+
+    def shown(self, kind: str, number: int) -> float:
+        """
+        Return what reading gives: the value written last, or the valid one, as the knob ``parameter_reading`` says.
+
+        Raises:
+            RefusedError: There is none.
+        """
+        value = self.value(kind, number)
+        return value if kind == "V" or self._shows_valid else self._written.get(number, value)
+
+    def write(self, kind: str, number: int, value: float) -> None:
+        """
+        Write a parameter or variable.
+
+        Raises:
+            RefusedError: There is none, or it does not take that value.
+        """
+        self.value(kind, number)
+        low, high = _LIMITS.get(number, (-_LARGEST, _LARGEST)) if kind == "P" else (-_LARGEST, _LARGEST)
+        rounded = round(value, stored_decimals(kind, number)) + 0.0
+        if not low <= rounded <= high:
+            raise RefusedError(NUMBER)
+        if kind == "V":
+            self._variables[number] = rounded
+        elif self._at_once or number in CONTROL_PARAMETERS:
+            self._valid[number] = rounded
+        else:
+            self._written[number] = rounded
+
+    def make_valid(self) -> None:
+        """Let everything written take effect, as VP does."""
+        self._valid |= self._written
+        self._written.clear()
+
+    def forget_written(self) -> None:
+        """Lose what VP has not made valid, as without power."""
+        self._written.clear()
+
+
+def stored_decimals(kind: str, number: int) -> int:
+    """Return the decimals of the stored resolution."""
+    if kind == "V":
+        return VARIABLE_DECIMALS
+    return next(decimals for last, decimals in _STORED_DECIMALS if number <= last)
+
+
+def _first_values(knobs: Knobs) -> dict[int, float]:
+    """Return what the knobs say of parameters; P20 is made of weights as far as known (UG p. 166)."""
+    p20 = knobs.p20 | int(knobs.xonxoff) | 2 * (knobs.error_style in {"prompt_only", "silent"})
+    return {
+        2: knobs.speed_percent,
+        6: knobs.acceleration_ms,
+        10: knobs.stop_ramp_ms,
+        11: knobs.travel_max,
+        12: knobs.travel_min,
+        14: 1.0,
+        20: p20,
+        90: UNITS.index(knobs.unit),
+    }
