@@ -20,6 +20,7 @@ from .errors import (
     MoveInDoubtError,
     MoveStoppedError,
     MoveTimeoutError,
+    RestoreIncompleteError,
     TransportError,
     UnexpectedAnswerError,
 )
@@ -47,6 +48,7 @@ __all__ = [
     "MoveResult",
     "MoveStoppedError",
     "MoveTimeoutError",
+    "RestoreIncompleteError",
     "SpeedStep",
     "TransportError",
     "UnexpectedAnswerError",

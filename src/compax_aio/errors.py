@@ -11,6 +11,7 @@ Every exception of compax_aio, one tree.
     ├── InvalidCommandError             refused here, before a byte was sent (also a ValueError)
     │   └── MoveActiveError             a move is running on that drive (also a MoveError)
     ├── UnexpectedAnswerError           the device answered something that is no answer to what was sent
+    ├── RestoreIncompleteError          a restore stopped half way; says what was applied and what was not
     ├── LinkProtocolError               a protocol was used out of turn: a defect in the caller's code
     └── MoveError                       a move did not end at its target
         ├── MoveStoppedError            it was stopped on the way
@@ -20,6 +21,9 @@ Every exception of compax_aio, one tree.
 """
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
 
 __all__ = [
     "AnswerTimeoutError",
@@ -34,6 +38,7 @@ __all__ = [
     "MoveInDoubtError",
     "MoveStoppedError",
     "MoveTimeoutError",
+    "RestoreIncompleteError",
     "TransportError",
     "UnexpectedAnswerError",
 ]
@@ -107,6 +112,28 @@ class InvalidCommandError(CompaxError, ValueError):
 
 class UnexpectedAnswerError(CompaxError):
     """The device answered something that is no answer to what was sent."""
+
+
+class RestoreIncompleteError(CompaxError):
+    """
+    A restore stopped half way.
+
+    Attributes:
+        applied: By number, what the drive had before and what it has now.
+        not_applied: Numbers that were not written, the one that was refused first; if its fate is unknown, read it.
+    """
+
+    def __init__(
+        self,
+        what: str,
+        *,
+        applied: Mapping[int, tuple[float, float]] | None = None,
+        not_applied: tuple[int, ...] = (),
+        **more: Any,
+    ) -> None:
+        super().__init__(what, **more)
+        self.applied = dict(applied or {})
+        self.not_applied = not_applied
 
 
 class LinkProtocolError(CompaxError):

@@ -34,6 +34,7 @@ from .line import DriveLine
 from .motion import Motion
 from .moves import Move, OnCancel
 from .observer import Observer
+from .parameters import VARIABLE_TABLE, NumberedValues, Parameters
 from .plain_line import check_line, is_query, starts_motion
 from .protocol import ComparatorReached, PositionReached, Stray
 from .settings import DriveSettings
@@ -106,6 +107,10 @@ class Drive:
     Positions are in :attr:`unit`, counted from machine zero (P1 shifts them, UG p. 104). Every method that asks the
     drive raises AnswerTimeoutError or ConnectionLostError when no answer comes, CommandRejectedError when the answer
     is an error, UnexpectedAnswerError when it is something else.
+
+    Attributes:
+        parameters: P1-P250, read, written, saved and restored.
+        variables: V1-V39 and V50-V70, likewise.
     """
 
     def __init__(self, name: str, settings: DriveSettings) -> None:
@@ -116,6 +121,8 @@ class Drive:
         self._line = DriveLine(name, settings, self._on_event, self._on_lost)
         self._observer = Observer(self._line, settings, self._on_fault)
         self._motion = Motion(self._observer, settings)
+        self.parameters = Parameters(self._line, settings)
+        self.variables = NumberedValues(self._line, settings, VARIABLE_TABLE)
 
     async def _open(self, url: str) -> None:
         await self._line.link.open(url)

@@ -25,6 +25,7 @@ class Dialect:
     stop: str = "STOP"
     quit: str = "QUIT"
     home: str = "PH"
+    make_valid: str = "VP"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

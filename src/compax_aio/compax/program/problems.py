@@ -1,0 +1,52 @@
+"""What is wrong with a listing: where, what, and what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import Enum
+
+from ...errors import InvalidCommandError
+
+__all__ = ["Problem", "Severity", "raise_for_errors"]
+
+
+class Severity(Enum):
+    """How bad it is."""
+
+    ERROR = "error"
+    """The drive cannot be told this, or the program cannot be meant so."""
+    WARNING = "warning"
+    """Probably not meant so."""
+    NOTE = "note"
+    """All right, but read otherwise than it is written."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Problem:
+    """One finding."""
+
+    line: int
+    """From 1."""
+    column: int
+    """From 1; each character counts one, a tab as well."""
+    severity: Severity
+    message: str
+    hint: str
+
+    def __str__(self) -> str:
+        """Write ``line 3, column 7: error: …; …``."""
+        return f"line {self.line}, column {self.column}: {self.severity.value}: {self.message}; {self.hint}"
+
+
+def raise_for_errors(problems: Iterable[Problem]) -> None:
+    """
+    Do nothing if none of *problems* is an error.
+
+    Raises:
+        InvalidCommandError: With all of the errors in its text, one a line.
+    """
+    errors = [str(problem) for problem in problems if problem.severity is Severity.ERROR]
+    if errors:
+        count = "1 error" if len(errors) == 1 else f"{len(errors)} errors"
+        raise InvalidCommandError("\n".join((f"{count} in the program:", *errors)))

@@ -1,0 +1,112 @@
+"""Parameters and variables as a file: TOML that people read, written whole or not at all, read strictly."""
+
+from __future__ import annotations
+
+import os
+import re
+import tempfile
+import tomllib
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import datetime
+from math import isfinite
+from pathlib import Path
+from typing import Final
+
+from ..errors import InvalidCommandError
+
+__all__ = ["ValueFile", "read_file", "write_file"]
+
+_MAX_BYTES: Final = 256 * 1024
+_KEY: Final = re.compile(r"([PV])(\d{1,3})")
+_NOT_IN_STRINGS: Final = re.compile(r'[\x00-\x1f\x7f"\\]')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ValueFile:
+    """What such a file says."""
+
+    kind: str
+    """``parameters`` or ``variables``: the name of the table that holds the values."""
+    drive: str
+    saved_at: str
+    values: Mapping[int, float]
+
+
+def write_file(
+    path: Path,
+    *,
+    kind: str,
+    letter: str,
+    drive: str,
+    saved_at: datetime,
+    values: Mapping[int, float],
+    decimals: Mapping[int, int],
+    comments: Mapping[int, str],
+) -> None:
+    """
+    Write *values* to *path*; a file that is there is replaced at the end, or left as it is.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
+    lines = [
+        f"# {kind.capitalize()} of a COMPAX drive, as it sent them.",
+        f'kind = "{kind}"',
+        f'drive = "{_NOT_IN_STRINGS.sub("?", drive)}"',
+        f"saved_at = {saved_at.isoformat(timespec='seconds')}",
+        "",
+        f"[{kind}]",
+    ]
+    for number, value in sorted(values.items()):
+        line = f"{letter}{number} = {value:.{decimals[number]}f}"
+        lines.append(f"{line:<24}# {comments[number]}" if number in comments else line)
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write("\n".join(lines) + "\n")
+            file.flush()
+            os.fsync(file.fileno())
+        Path(name).replace(path)
+    except BaseException:
+        with suppress(OSError):
+            Path(name).unlink()
+        raise
+
+
+def read_file(path: Path, *, kind: str, letter: str) -> ValueFile:
+    """
+    Read a file that :func:`write_file` has written, or somebody by its example.
+
+    Raises:
+        InvalidCommandError: It is no such file, or holds something that is no such value; says what and where.
+        OSError: It cannot be read.
+    """
+    with path.open("rb") as file:
+        data = file.read(_MAX_BYTES + 1)
+    if len(data) > _MAX_BYTES:
+        raise InvalidCommandError(f"{path} is larger than any file of {kind}: more than {_MAX_BYTES} bytes")
+    try:
+        content = tomllib.loads(data.decode("utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise InvalidCommandError(f"{path} is no TOML: {error}") from error
+    if content.get("kind") != kind or set(content) - {"kind", "drive", "saved_at", kind}:
+        raise InvalidCommandError(
+            f'{path} is no file of {kind}: it must say kind = "{kind}" and hold a table [{kind}], and nothing else',
+            hint=f"it holds {', '.join(sorted(content)) or 'nothing'}",
+        )
+    table = content.get(kind)
+    if not isinstance(table, dict):
+        raise InvalidCommandError(f"{path} has no table [{kind}]")
+    values: dict[int, float] = {}
+    for key, value in table.items():
+        found = _KEY.fullmatch(key)
+        if found is None or found[1] != letter or int(found[2]) in values:
+            raise InvalidCommandError(f"{path}: {key!r} is not one of {letter}1, {letter}2, …, each once")
+        if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+            raise InvalidCommandError(f"{path}: {key} = {value!r} is no number")
+        values[int(found[2])] = float(value)
+    return ValueFile(
+        kind=kind, drive=str(content.get("drive", "")), saved_at=str(content.get("saved_at", "")), values=values
+    )
