@@ -1,4 +1,4 @@
-"""What a drive says, byte for byte, as the fact sheet prints it; written without the library's own reader."""
+"""What a drive says, byte for byte, as the manual has it; written without the library's own reader."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ def test_comparators_speak_with_their_number_in_the_order_of_travel(terminal: Te
 
 
 def test_the_minimal_conversation(terminal: Terminal) -> None:
-    """Section 14.1 of the fact sheet; the position on the way is a matter of time."""
+    """A minimal conversation; the position on the way is a matter of time."""
     assert terminal.say("S17") == b"S017: 00000010\r\n>"
     assert terminal.say("GOTO 302") == PROMPT
     assert terminal.say("SD 50") == PROMPT
