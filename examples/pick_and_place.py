@@ -8,6 +8,7 @@ import sys
 from collections.abc import Sequence
 
 import compax_aio
+from compax_aio import Comparator
 
 SIMULATED = "sim://compax?machine_zero=-10"
 
@@ -18,19 +19,18 @@ CAMERA = 10
 
 PICK, PLACE = 20.0, 320.0
 
-Comparator = tuple[float, int, int]
-"""Distance from the start of the move, output, value. The drive reports it by its place in the list, from 1."""
-TO_PICK: Sequence[Comparator] = [(15, GRIPPER, 1)]
-TO_PLACE: Sequence[Comparator] = [(295, GRIPPER, 0), (150, CAMERA, 1)]
-BACK: Sequence[Comparator] = [(10, CAMERA, 0)]
+# Distance from the start of the move, output, value. The drive reports each by its place in the list, from 1.
+TO_PICK = [Comparator(15, GRIPPER, 1)]
+TO_PLACE = [Comparator(295, GRIPPER, 0), Comparator(150, CAMERA, 1)]
+BACK = [Comparator(10, CAMERA, 0)]
 
 
 async def go(axis: compax_aio.Drive, target: float, comparators: Sequence[Comparator]) -> None:
     """Move to *target*, and print each comparator as it is passed."""
     move = axis.move_to(target, comparators=comparators)
     async for number in move.comparators():
-        distance, output, value = comparators[number - 1]
-        print(f"  {distance:g} {axis.unit} on the way: O{output}={value}")
+        passed = comparators[number - 1]
+        print(f"  {passed.distance:g} {axis.unit} on the way: O{passed.output}={passed.value}")
     result = await move
     print(f"at {result.target:g} {axis.unit}")
 
