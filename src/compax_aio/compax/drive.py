@@ -274,11 +274,11 @@ class Drive:
 
     async def error(self) -> DeviceError | None:
         """Read the error that is present (S30, IBS p. 12); None if there is none."""
-        return decode_error(await self._line.query("S30"))
+        return await self._line.read("S30", decode_error)
 
     async def error_history(self) -> tuple[HistoryEntry, ...]:
         """Read the error history (S18, UG p. 209), newest first."""
-        return decode_history(await self._line.query("S18"))
+        return await self._line.read("S18", decode_history)
 
     async def read_status(self, number: int) -> StatusValue:
         """
@@ -289,7 +289,7 @@ class Drive:
         """
         if isinstance(number, bool) or not isinstance(number, int) or not 1 <= number <= _MAX_STATUS:
             raise InvalidCommandError(f"a status has a whole number from 1 to {_MAX_STATUS}, not {number!r}")
-        return decode_status_value(number, await self._line.query(f"S{number}"), self.unit)
+        return await self._line.read(f"S{number}", lambda answer: decode_status_value(number, answer, self.unit))
 
     # Raw ------------------------------------------------------------------------------------------------------------
 

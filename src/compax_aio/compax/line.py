@@ -85,9 +85,13 @@ class DriveLine:
         if not isinstance(outcome, Acknowledged):
             raise self.error_of(text, outcome)
 
+    async def read(self, text: str, decode: Callable[[str], _Value], lane: Lane = Lane.READ) -> _Value:
+        """Ask, and decode the answer; an answer that cannot be decoded is told with the drive and its exchanges."""
+        return self._decoded(decode, await self.query(text, lane))
+
     async def number(self, number: int, lane: Lane = Lane.READ) -> float:
         """Read the status value ``S<number>``; see :meth:`query` for errors."""
-        return self._decoded(decode_number, await self.query(f"S{number}", lane))
+        return await self.read(f"S{number}", decode_number, lane)
 
     async def position(self, lane: Lane = Lane.READ) -> float:
         """Read S1, the actual position (UG p. 104), and remember it."""

@@ -65,7 +65,7 @@ class Observer:
     async def read_error(self) -> DeviceError | None:
         """Read S30; None also where the drive does not say, or cannot be heard: the fault itself is known already."""
         try:
-            return decode_error(await self.line.query("S30", Lane.CONTROL))
+            return await self.line.read("S30", decode_error, Lane.CONTROL)
         except (AnswerTimeoutError, CommandRejectedError, UnexpectedAnswerError):
             return None
 

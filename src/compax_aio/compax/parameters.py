@@ -126,7 +126,7 @@ class NumberedValues:
             InvalidCommandError: There is no such number; nothing was sent.
             CommandRejectedError: The drive does not give it.
         """
-        return decode_number(await self._line.query(self._name(number), Lane.READ))
+        return await self._line.read(self._name(number), decode_number)
 
     async def write(self, number: int, value: float) -> float:
         """
@@ -194,8 +194,11 @@ class NumberedValues:
             InvalidCommandError: It is no such file, or holds what cannot be said to the drive.
             OSError: It cannot be read.
         """
+        return await self._compare(await self._load(path))
+
+    async def _compare(self, values: Mapping[int, float]) -> tuple[Difference, ...]:
         differences = []
-        for number, value in (await self._load(path)).items():
+        for number, value in values.items():
             try:
                 in_drive: float | None = await self.read(number)
             except CommandRejectedError:
@@ -220,9 +223,8 @@ class NumberedValues:
             RestoreIncompleteError: A value was refused, or its fate is unknown; says which were applied and which
                 not. :meth:`roll_back` takes them back.
         """
-        differences = await self.diff(path)
-        total = len(await self._load(path))
-        changes = {each.number: (each.in_drive, each.in_file) for each in differences}
+        values = await self._load(path)
+        changes = {each.number: (each.in_drive, each.in_file) for each in await self._compare(values)}
         applied: dict[int, tuple[float, float]] = {}
         for number, (old, new) in changes.items():
             try:
@@ -245,7 +247,7 @@ class NumberedValues:
             applied[number] = (old, new)
             if on_progress is not None:
                 on_progress(len(applied), len(changes))
-        return Restored(changed=applied, unchanged=total - len(changes), was_dry_run=dry_run)
+        return Restored(changed=applied, unchanged=len(values) - len(changes), was_dry_run=dry_run)
 
     async def roll_back(self, error: RestoreIncompleteError) -> None:
         """Write the values that the drive had before a restore that was not completed."""
