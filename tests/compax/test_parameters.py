@@ -77,6 +77,14 @@ async def test_a_parameter_is_pending_until_it_is_made_valid(drive: Drive, far: 
     assert "VP" in lines(far)
 
 
+async def test_a_refused_write_does_not_hide_that_an_earlier_one_is_pending(drive: Drive) -> None:
+    async with drive.parameters.unlocked() as parameters:
+        await parameters.write(10, 200)
+    with pytest.raises(CommandRejectedError):
+        await drive.parameters.write(10, 300)
+    assert drive.parameters.pending == (10,)
+
+
 async def test_unlocked_parameters_are_locked_again_however_the_block_ends(drive: Drive) -> None:
     async def fail_inside() -> None:
         async with drive.parameters.unlocked():

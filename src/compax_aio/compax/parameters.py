@@ -309,12 +309,14 @@ class Parameters(NumberedValues):
     async def write(self, number: int, value: float) -> float:
         """Write one parameter; see :meth:`NumberedValues.write` and :attr:`pending`."""
         self._written(number, value)
+        was_pending = number in self._pending
         if number not in CONTROL_PARAMETERS:
             self._pending.add(number)
         try:
             return await super().write(number, value)
         except CommandRejectedError:
-            self._pending.discard(number)
+            if not was_pending:
+                self._pending.discard(number)
             raise
 
     async def make_valid(self) -> None:
