@@ -1,7 +1,8 @@
 """Move servo axes over a serial line or TCP and await the position reached."""
 
 from .compax.codecs import DriveStatus
-from .compax.drive import Drive, connect
+from .compax.connecting import connect
+from .compax.drive import Drive
 from .compax.group import DriveGroup, GroupMove
 from .compax.moves import Move, MoveResult
 from .compax.protocol import MessageForm

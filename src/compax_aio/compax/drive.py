@@ -3,23 +3,15 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Generator, Iterable
+from collections.abc import Iterable
 from types import TracebackType
-from typing import Any, Final, Self
+from typing import Self
 
 from ..errors import ConnectionLostError, InvalidCommandError
 from ..link.cancellation import despite_cancellation
 from ..link.contract import Event, Lane
 from ..link.link import LinkStats
-from ..transports.url import TransportURL
-from .codecs import (
-    DriveStatus,
-    HistoryEntry,
-    StatusValue,
-    decode_error,
-    decode_history,
-    decode_status_value,
-)
+from .codecs import DriveStatus
 from .events import (
     ComparatorPassed,
     ConnectionLost,
@@ -37,6 +29,7 @@ from .observer import Observer
 from .parameters import VARIABLE_TABLE, NumberedValues, Parameters
 from .plain_line import check_line, is_query, starts_motion
 from .protocol import ComparatorReached, PositionReached, Stray
+from .readings import Readings
 from .settings import DriveSettings
 from .vocabulary import (
     Comparator,
@@ -47,62 +40,12 @@ from .vocabulary import (
     plan_move_to,
 )
 
-__all__ = ["Connecting", "Drive", "connect"]
-
-_MAX_STATUS: Final = 250
+__all__ = ["Drive"]
 
 
-def connect(url: str, *, name: str | None = None, settings: DriveSettings | None = None) -> Connecting:
+class Drive(Readings):
     """
-    Connect to one drive.
-
-    Await the result, and close the drive yourself, or use it as ``async with connect(url) as drive``: leaving the
-    block, however it ends, stops the moves that it started and closes the line.
-
-    Args:
-        url: ``serial:///dev/ttyUSB0?baudrate=9600``, ``tcp://host:4001``, ``unix:///run/drive.sock``,
-            ``loop://name``, ``sim://compax``, or a scheme that a plugin adds.
-        name: For errors, logs and results; the URL without its query if not given.
-        settings: Time-outs and what is known of this drive's ways.
-
-    Raises (when awaited or entered):
-        TransportError: The line cannot be opened; the error says why.
-        AnswerTimeoutError: Nothing on it answers as a COMPAX would.
-    """
-    return Connecting(url, name or str(TransportURL.parse(url)).partition("?")[0], settings or DriveSettings())
-
-
-class Connecting:
-    """A connection about to be made: awaitable, and an asynchronous context manager."""
-
-    def __init__(self, url: str, name: str, settings: DriveSettings) -> None:
-        self._url = url
-        self._name = name
-        self._settings = settings
-        self._drive: Drive | None = None
-
-    def __await__(self) -> Generator[Any, None, Drive]:
-        return self._open().__await__()
-
-    async def __aenter__(self) -> Drive:
-        self._drive = await self._open()
-        return self._drive
-
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        assert self._drive is not None
-        await self._drive.close()
-
-    async def _open(self) -> Drive:
-        drive = Drive(self._name, self._settings)
-        await drive._open(self._url)  # noqa: SLF001 - the two halves of one class
-        return drive
-
-
-class Drive:
-    """
-    One COMPAX drive on an open line; made by :func:`connect`.
+    One COMPAX drive on an open line; made by :func:`compax_aio.connect`.
 
     Positions are in :attr:`unit`, counted from machine zero (P1 shifts them, UG p. 104). Every method that asks the
     drive raises AnswerTimeoutError or ConnectionLostError when no answer comes, CommandRejectedError when the answer
@@ -115,14 +58,13 @@ class Drive:
 
     def __init__(self, name: str, settings: DriveSettings) -> None:
         self.name = name
-        self.settings = settings
         self._events = EventHub()
         self._loop = asyncio.get_running_loop()
-        self._line = DriveLine(name, settings, self._on_event, self._on_lost)
-        self._observer = Observer(self._line, settings, self._on_fault)
-        self._motion = Motion(self._observer, settings)
-        self.parameters = Parameters(self._line, settings)
-        self.variables = NumberedValues(self._line, settings, VARIABLE_TABLE)
+        line = DriveLine(name, settings, self._on_event, self._on_lost)
+        super().__init__(line, Observer(line, self._on_fault))
+        self._motion = Motion(self._observer)
+        self.parameters = Parameters(line)
+        self.variables = NumberedValues(line, VARIABLE_TABLE)
 
     async def _open(self, url: str) -> None:
         await self._line.link.open(url)
@@ -246,51 +188,6 @@ class Drive:
         """Read the status after a move was in doubt; from then on the drive takes motion again."""
         return await self._motion.reconcile()
 
-    # Reading --------------------------------------------------------------------------------------------------------
-
-    async def position(self) -> float:
-        """Read the actual position (S1, UG p. 104) in :attr:`unit`."""
-        return await self._line.position()
-
-    async def target(self) -> float:
-        """Read the target position (S2, IBS p. 12) in :attr:`unit`."""
-        return await self._line.number(2)
-
-    async def following_error(self) -> float:
-        """Read set minus actual position (S3, IBS p. 38) in :attr:`unit`."""
-        return await self._line.number(3)
-
-    async def speed(self) -> float:
-        """Read the traverse speed (S4, IBS p. 70), by inference in % of nominal speed."""
-        return await self._line.number(4)
-
-    async def torque(self) -> float:
-        """Read the motor torque (S5, IBS p. 70), by inference in % of nominal torque."""
-        return await self._line.number(5)
-
-    async def status(self) -> DriveStatus:
-        """Read S16 and S17, every bit by its name (UG p. 209)."""
-        return await self._observer.read_status(Lane.READ)
-
-    async def error(self) -> DeviceError | None:
-        """Read the error that is present (S30, IBS p. 12); None if there is none."""
-        return await self._line.read("S30", decode_error)
-
-    async def error_history(self) -> tuple[HistoryEntry, ...]:
-        """Read the error history (S18, UG p. 209), newest first."""
-        return await self._line.read("S18", decode_history)
-
-    async def read_status(self, number: int) -> StatusValue:
-        """
-        Read the status value ``S<number>``, decoded as far as its form is documented.
-
-        Raises:
-            InvalidCommandError: *number* is not a whole number from 1 to 250.
-        """
-        if isinstance(number, bool) or not isinstance(number, int) or not 1 <= number <= _MAX_STATUS:
-            raise InvalidCommandError(f"a status has a whole number from 1 to {_MAX_STATUS}, not {number!r}")
-        return await self._line.read(f"S{number}", lambda answer: decode_status_value(number, answer, self.unit))
-
     # Raw ------------------------------------------------------------------------------------------------------------
 
     async def command(self, text: str) -> str:
@@ -335,9 +232,9 @@ class Drive:
         return self._events.stream()
 
     @property
-    def unit(self) -> str:
-        """The name of the axis's unit, from the settings."""
-        return self.settings.unit
+    def settings(self) -> DriveSettings:
+        """What is known of this drive."""
+        return self._line.settings
 
     @property
     def stats(self) -> LinkStats:

@@ -9,7 +9,8 @@ from typing import Any, TypeVar
 
 from ..errors import InvalidCommandError, MoveStoppedError
 from ..link.cancellation import despite_cancellation
-from .drive import Connecting, Drive, connect
+from .connecting import Connecting, connect
+from .drive import Drive
 from .moves import Move, MoveResult, fetch_error
 from .settings import DriveSettings
 from .vocabulary import MovePlan, plan_home, plan_move_to

@@ -38,6 +38,7 @@ class DriveLine:
         on_lost: Callable[[ConnectionLostError], None],
     ) -> None:
         self.name = name
+        self.settings = settings
         self.protocol = CompaxProtocol(settings.message_form)
         self.link = Link(
             self.protocol,

@@ -21,7 +21,6 @@ from .moves import Move, OnCancel, fetch_error
 from .observer import Observer
 from .pursuit import Memory, Pursuit
 from .reports import Reports
-from .settings import DriveSettings
 from .stopping import Stop
 from .vocabulary import MovePlan, check_number
 
@@ -36,14 +35,12 @@ class Motion:
 
     Args:
         observer: Of the drive.
-        settings: How patient to be.
     """
 
-    def __init__(self, observer: Observer, settings: DriveSettings) -> None:
+    def __init__(self, observer: Observer) -> None:
         self.name = observer.line.name
         self._has_untracked_motion = False
         self._observer = observer
-        self._settings = settings
         self._reports = Reports(self.name, observer)
         self._loop = asyncio.get_running_loop()
         self._memory = Memory()
@@ -82,7 +79,7 @@ class Motion:
         self.check(plan)
         self._release()
         move = Move(self, plan, on_cancel)
-        self._active = Pursuit(move, self._observer, self._settings, self._memory)
+        self._active = Pursuit(move, self._observer, self._memory)
         self._task = self._loop.create_task(self._pursue(self._active), name=f"{self.name}: {plan.description}")
         if timeout_s is not None:
             timer = self._loop.call_later(timeout_s, self._time_is_up, move, timeout_s)
@@ -201,7 +198,7 @@ class Motion:
             pursuit = None
         if self._stopping is None:
             self._has_untracked_motion = False
-            stop = Stop(self._observer, self._settings)
+            stop = Stop(self._observer)
             self._stopping = self._loop.create_task(self._stop(stop, pursuit, reason), name=f"{self.name}: stop")
             self._stopping.add_done_callback(self._stop_done)
         return self._stopping

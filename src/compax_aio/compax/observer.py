@@ -12,7 +12,6 @@ from ..link.contract import Lane
 from .codecs import DriveStatus, decode_error
 from .facts.device_errors import DeviceError
 from .line import DriveLine
-from .settings import DriveSettings
 
 __all__ = ["Look", "Observer"]
 
@@ -39,18 +38,13 @@ class Observer:
 
     Args:
         line: The drive's line.
-        settings: Decimals, and how patient to be.
         on_fault: Called when a status that was read shows a fault, once for each.
     """
 
-    def __init__(
-        self, line: DriveLine, settings: DriveSettings, on_fault: Callable[[DeviceError | None], None]
-    ) -> None:
+    def __init__(self, line: DriveLine, on_fault: Callable[[DeviceError | None], None]) -> None:
         self.line = line
-        self._settings = settings
         self._on_fault = on_fault
         self._faulted = False
-        self._tolerance = 5 * 10.0**-settings.decimals
 
     async def read_status(self, lane: Lane = Lane.CONTROL) -> DriveStatus:
         """Read S16 and S17; a fault they show is told to whoever follows the drive's events."""
@@ -81,7 +75,7 @@ class Observer:
     async def patiently(self, read: Callable[[], Awaitable[_Value]]) -> _Value:
         """Read, again and again if need be; raise the last error when it has failed for ``in_doubt_after_s``."""
         loop = asyncio.get_running_loop()
-        give_up_at = loop.time() + self._settings.in_doubt_after_s
+        give_up_at = loop.time() + self.line.settings.in_doubt_after_s
         while True:
             try:
                 return await read()
@@ -90,7 +84,7 @@ class Observer:
             except CompaxError:
                 if loop.time() >= give_up_at:
                     raise
-            await asyncio.sleep(self._settings.poll_first_s)
+            await asyncio.sleep(self.line.settings.poll_first_s)
 
     async def commanded_position(self) -> float:
         """Read S2, the target position (IBS p. 12), or S1 from a drive that has none to give."""
@@ -107,10 +101,12 @@ class Observer:
 
     def is_near(self, position: float | None, target: float | None) -> bool:
         """Whether two positions are the same but for a few of the last decimals."""
-        return position is not None and target is not None and abs(position - target) <= self._tolerance
+        tolerance = 5 * 10.0**-self.line.settings.decimals
+        return position is not None and target is not None and abs(position - target) <= tolerance
 
     def written(self, position: float | None) -> str:
         """Write a position for an error."""
         if position is None:
             return "an unknown position"
-        return f"{position:.{self._settings.decimals}f} {self._settings.unit}"
+        settings = self.line.settings
+        return f"{position:.{settings.decimals}f} {settings.unit}"

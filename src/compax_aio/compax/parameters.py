@@ -35,7 +35,6 @@ from .facts.parameters import (
 )
 from .line import DriveLine
 from .plain_line import check_line
-from .settings import DriveSettings
 from .value_file import read_file, write_file
 from .vocabulary import check_number
 
@@ -107,13 +106,11 @@ class NumberedValues:
 
     Args:
         line: The drive's line.
-        settings: The name of the axis's unit, and the words that may differ.
         table: Which values there are.
     """
 
-    def __init__(self, line: DriveLine, settings: DriveSettings, table: ValueTable) -> None:
+    def __init__(self, line: DriveLine, table: ValueTable) -> None:
         self._line = line
-        self._settings = settings
         self._table = table
 
     # One ------------------------------------------------------------------------------------------------------------
@@ -267,7 +264,7 @@ class NumberedValues:
         fact = self._table.facts.get(number)
         if fact is None:
             return None
-        unit = self._settings.unit if fact.unit == "axis" else fact.unit
+        unit = self._line.settings.unit if fact.unit == "axis" else fact.unit
         return f"{fact.meaning} [{unit}]" if unit else fact.meaning
 
     def _name(self, number: int) -> str:
@@ -297,8 +294,8 @@ class Parameters(NumberedValues):
     the control parameters P40-P49, which are live (UG p. 100-101, 158).
     """
 
-    def __init__(self, line: DriveLine, settings: DriveSettings) -> None:
-        super().__init__(line, settings, PARAMETER_TABLE)
+    def __init__(self, line: DriveLine) -> None:
+        super().__init__(line, PARAMETER_TABLE)
         self._pending: set[int] = set()
 
     @property
@@ -321,7 +318,7 @@ class Parameters(NumberedValues):
 
     async def make_valid(self) -> None:
         """Declare written parameters valid (VP, CAN p. 32): they are in force from now on."""
-        await self._line.command(self._settings.dialect.make_valid)
+        await self._line.command(self._line.settings.dialect.make_valid)
         self._pending.clear()
 
     async def unlock(self) -> None:

@@ -27,7 +27,6 @@ from .moves import Move
 from .observer import Look, Observer
 from .protocol import Acknowledged, MessageForm
 from .reports import Reports
-from .settings import DriveSettings
 from .verdict import Verdict, judge
 
 __all__ = ["Memory", "Pursuit"]
@@ -62,15 +61,14 @@ class Pursuit:
     Args:
         move: What its holder awaits; this ends it, one way or the other, unless it is cancelled first.
         observer: Of the drive.
-        settings: How patient to be.
         memory: Of the drive.
     """
 
-    def __init__(self, move: Move, observer: Observer, settings: DriveSettings, memory: Memory) -> None:
+    def __init__(self, move: Move, observer: Observer, memory: Memory) -> None:
         self.move = move
         self._observer = observer
         self._line = observer.line
-        self._settings = settings
+        self._settings = observer.line.settings
         self._memory = memory
         self._reports = Reports(observer.line.name, observer)
         self._loop = asyncio.get_running_loop()

@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from math import isfinite
+from typing import Final
 
 from ..errors import InvalidCommandError
 from .facts.limits import MAX_SPEED_PERCENT, POSITION_DECIMALS, POSITION_DECIMALS_INCH
 from .plain_line import check_line
 from .protocol import MessageForm
 
-__all__ = ["Dialect", "DriveSettings"]
+__all__ = ["AxisUnit", "Dialect", "DriveSettings"]
+
+
+_PLACES: Final[Mapping[str, Mapping[str, object]]] = {
+    "record": {"n": 250, "text": "END"},
+    "set_pointer": {"n": 250},
+    "single_record": {"n": 250},
+    "change_speed": {"percent": 100},
+}
+"""What a word has places for, with an example of the longest."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -18,14 +29,60 @@ class Dialect:
     """
     The words of commands whose RS-232 form stands on no page that was available.
 
-    The defaults are the words that manuals use for the functions (UG p. 101, 162; CAN-S p. 28); change them, if your
-    drive says otherwise, without changing code.
+    The defaults are the words that manuals use for the functions (UG p. 101, 158, 162; CAN p. 32, 69; CAN-S p. 28);
+    change them, if your drive says otherwise, without changing code. Those that are None have no word that is known:
+    what needs them is refused until you give one.
     """
 
     stop: str = "STOP"
+    start: str = "START"
+    break_off: str = "BREAK"
+    """Ends program and positioning, so that START does not continue them."""
     quit: str = "QUIT"
     home: str = "PH"
     make_valid: str = "VP"
+    record: str = "N{n:03d}: {text}"
+    """How a record is written: by the style of the listings (UG p. 95)."""
+    set_pointer: str = "GOTO {n}"
+    """Lets START begin at record n: the function is in CAN p. 69, the word is that of the PLC interface (UG p. 158)."""
+    single_record: str | None = None
+    """Runs record n alone, with ``{n}``; the function exists (CAN p. 69)."""
+    real_zero: str | None = None
+    """Takes the actual position as real zero; the function exists (CAN p. 32)."""
+    change_speed: str = "PR0 SD{percent}"
+    """Another speed for the positioning that runs: by the name of the fieldbus object (IBS p. 42)."""
+    power_on: str = "OT O0=0"
+    """Drive energised. Which number does what is inferred from the order of the functions (CAN p. 32, UG p. 209)."""
+    power_off: str = "OT O0=1"
+    """No current, brake closed."""
+    power_off_brake_open: str = "OT O0=2"
+    """No current, brake open: a hanging load falls."""
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be sent."""
+        for each in fields(self):
+            word, places = getattr(self, each.name), _PLACES.get(each.name, {})
+            if word is None and each.default is None:
+                continue
+            if not isinstance(word, str):
+                raise InvalidCommandError(f"the word for {each.name} is a text, not {word!r}")
+            try:
+                check_line(word.format(**places))
+            except (AttributeError, LookupError, TypeError, ValueError) as error:
+                wanted = ", ".join(f"{{{place}}}" for place in places) or "none"
+                raise InvalidCommandError(
+                    f"the word for {each.name} cannot be {word!r}: {error}", hint=f"places it may have: {wanted}"
+                ) from error
+            if missing := [place for place in places if f"{{{place}" not in word]:
+                raise InvalidCommandError(f"the word for {each.name} must hold {{{missing[0]}}}, unlike {word!r}")
+
+
+@dataclass(frozen=True, slots=True)
+class AxisUnit:
+    """What one value of P90 means: the unit of positions and their decimals, 2 or 3 (UG p. 100-101)."""
+
+    name: str
+    decimals: int = POSITION_DECIMALS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,9 +95,16 @@ class DriveSettings:
         resync_attempts: How many status queries are tried to get back in step before the drive counts as silent.
         unit: Name of the unit chosen with P90, for people; the drive does not send it.
         decimals: Of positions and distances: 2, or 3 where the unit is inches (UG p. 100).
+        units: What the values of P90 mean on this drive, for :meth:`Drive.read_axis`; no page at hand says it.
+        travel: Lowest and highest position that may be commanded; None: whatever a number can say.
         speed_limit_percent: Speeds above are refused. The drive takes up to 600 (IBS p. 42), few axes do.
         message_form: What the drive answers to a command with ``$``; UNKNOWN lets the first move find out.
         verify_messages: Ask the status before ``$`` is believed: for drives that send it after a stop or fault too.
+        message_when_prepared: Ask for ``$`` also when a move is prepared with ``,``; whether a drive takes both signs
+            on one line is not documented.
+        binary_settings: Send SPEED and ACCEL in binary where P20 allows it (UG p. 166).
+        binary_motion: Send POSA and POSR so, too. A frame that loses a byte swallows what comes next and may become a
+            move to another target: only for lines that cannot lose bytes. Needs *binary_settings*.
         poll_first_s: A pending move's status is asked for the first time after this, then ever more rarely …
         poll_slowest_s: … down to one look in this many seconds.
         stall_timeout_s: A move whose axis stands still for so long, while its command is active, has failed.
@@ -54,9 +118,14 @@ class DriveSettings:
     resync_attempts: int = 3
     unit: str = "units"
     decimals: int = POSITION_DECIMALS
+    units: Mapping[int, AxisUnit] = field(default_factory=dict)
+    travel: tuple[float, float] | None = None
     speed_limit_percent: float = 100.0
     message_form: MessageForm = MessageForm.UNKNOWN
     verify_messages: bool = False
+    message_when_prepared: bool = False
+    binary_settings: bool = False
+    binary_motion: bool = False
     poll_first_s: float = 0.1
     poll_slowest_s: float = 0.5
     stall_timeout_s: float = 10.0
@@ -67,14 +136,19 @@ class DriveSettings:
 
     def __post_init__(self) -> None:
         """Refuse what cannot be meant."""
-        for each in fields(self.dialect):
-            check_line(getattr(self.dialect, each.name))
         for each in fields(self):
             value = getattr(self, each.name)
             if each.name.endswith("_s") and not (isfinite(value) and value > 0):
                 raise InvalidCommandError(f"{each.name} must be a finite number of seconds above 0, not {value!r}")
-        if type(self.decimals) is not int or self.decimals not in (POSITION_DECIMALS, POSITION_DECIMALS_INCH):
-            raise InvalidCommandError(f"decimals must be 2, or 3 for inches, not {self.decimals!r}")
+        for decimals in (self.decimals, *(unit.decimals for unit in self.units.values())):
+            if type(decimals) is not int or decimals not in (POSITION_DECIMALS, POSITION_DECIMALS_INCH):
+                raise InvalidCommandError(f"decimals must be 2, or 3 for inches, not {decimals!r}")
+        if self.travel is not None and not (
+            len(self.travel) == 2 and all(map(isfinite, self.travel)) and self.travel[0] < self.travel[1]
+        ):
+            raise InvalidCommandError(f"travel is a lowest and a highest position, not {self.travel!r}")
+        if self.binary_motion and not self.binary_settings:
+            raise InvalidCommandError("binary_motion needs binary_settings as well: it is the second opt-in")
         if not 0 < self.speed_limit_percent <= MAX_SPEED_PERCENT:
             raise InvalidCommandError(
                 f"speed_limit_percent must be above 0 and at most {MAX_SPEED_PERCENT:g}, "

@@ -9,7 +9,6 @@ from ..errors import AnswerTimeoutError, CommandRejectedError, CompaxError, Conn
 from ..link.contract import Lane, TurnOver
 from .observer import Look, Observer
 from .protocol import Acknowledged
-from .settings import DriveSettings
 
 __all__ = ["Stop"]
 
@@ -22,12 +21,11 @@ class Stop:
 
     Args:
         observer: Of the drive.
-        settings: The word for STOP, and how long it may take.
     """
 
-    def __init__(self, observer: Observer, settings: DriveSettings) -> None:
+    def __init__(self, observer: Observer) -> None:
         self._observer = observer
-        self._settings = settings
+        self._settings = observer.line.settings
         self._loop = asyncio.get_running_loop()
         self._reply = self._send()
 

@@ -1,0 +1,78 @@
+"""What a drive can be asked: position, speed, status bits, errors, and every status value by its number."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from ..errors import InvalidCommandError
+from ..link.contract import Lane
+from .codecs import DriveStatus, HistoryEntry, StatusValue, decode_error, decode_history, decode_status_value
+from .facts.device_errors import DeviceError
+from .line import DriveLine
+from .observer import Observer
+
+__all__ = ["Readings"]
+
+_MAX_STATUS: Final = 250
+
+
+class Readings:
+    """
+    The readings of one drive; :class:`~compax_aio.compax.drive.Drive` has them.
+
+    Args:
+        line: The drive's line.
+        observer: Of the same drive.
+    """
+
+    def __init__(self, line: DriveLine, observer: Observer) -> None:
+        self._line = line
+        self._observer = observer
+
+    @property
+    def unit(self) -> str:
+        """The name of the axis's unit, from the settings."""
+        return self._line.settings.unit
+
+    async def position(self) -> float:
+        """Read the actual position (S1, UG p. 104) in :attr:`unit`."""
+        return await self._line.position()
+
+    async def target(self) -> float:
+        """Read the target position (S2, IBS p. 12) in :attr:`unit`."""
+        return await self._line.number(2)
+
+    async def following_error(self) -> float:
+        """Read set minus actual position (S3, IBS p. 38) in :attr:`unit`."""
+        return await self._line.number(3)
+
+    async def speed(self) -> float:
+        """Read the traverse speed (S4, IBS p. 70), by inference in % of nominal speed."""
+        return await self._line.number(4)
+
+    async def torque(self) -> float:
+        """Read the motor torque (S5, IBS p. 70), by inference in % of nominal torque."""
+        return await self._line.number(5)
+
+    async def status(self) -> DriveStatus:
+        """Read S16 and S17, every bit by its name (UG p. 209)."""
+        return await self._observer.read_status(Lane.READ)
+
+    async def error(self) -> DeviceError | None:
+        """Read the error that is present (S30, IBS p. 12); None if there is none."""
+        return await self._line.read("S30", decode_error)
+
+    async def error_history(self) -> tuple[HistoryEntry, ...]:
+        """Read the error history (S18, UG p. 209), newest first."""
+        return await self._line.read("S18", decode_history)
+
+    async def read_status(self, number: int) -> StatusValue:
+        """
+        Read the status value ``S<number>``, decoded as far as its form is documented.
+
+        Raises:
+            InvalidCommandError: *number* is not a whole number from 1 to 250.
+        """
+        if isinstance(number, bool) or not isinstance(number, int) or not 1 <= number <= _MAX_STATUS:
+            raise InvalidCommandError(f"a status has a whole number from 1 to {_MAX_STATUS}, not {number!r}")
+        return await self._line.read(f"S{number}", lambda answer: decode_status_value(number, answer, self.unit))
