@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Mapping
-from contextlib import asynccontextmanager
-from typing import Final
+import os
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping
+from contextlib import AsyncExitStack, asynccontextmanager, contextmanager
+from pathlib import Path
+from typing import Any, Final, Protocol, runtime_checkable
 
 from compax_aio.errors import TransportError
 from compax_aio.transports.loopback import create_pair, listen
@@ -14,12 +16,27 @@ from compax_aio.transports.url import TransportURL
 
 from .compax.drive import SimulatedDrive
 from .compax.knobs import Knobs
+from .compax.state import read_state_file, write_state_file
 from .line import Connection, DeviceLine, SimulatedDevice
 
-__all__ = ["drive_named", "open_simulator", "serve_loopback", "serve_pty", "serve_tcp"]
+__all__ = ["drive_named", "open_simulator", "serve_loopback", "serve_pty", "serve_tcp", "serve_tcp_group"]
 
 _FORM: Final = "sim://compax?name=x&answer_time_s=0.005"
 _NAME: Final = "name"
+_LAST_PORT: Final = 65_535
+
+_File = str | os.PathLike[str]
+
+
+@runtime_checkable
+class _Lasting(Protocol):
+    """A device that has a state."""
+
+    def save_state(self) -> dict[str, Any]:
+        """Return what it keeps without power."""
+
+    def load_state(self, state: Mapping[str, Any]) -> None:
+        """Have kept that."""
 
 
 async def open_simulator(url: TransportURL, protocol_factory: ProtocolFactory) -> asyncio.Transport:
@@ -75,7 +92,9 @@ def drive_named(name: str, knobs: Knobs | None = None) -> SimulatedDrive:
 
 
 @asynccontextmanager
-async def serve_tcp(device: SimulatedDevice, host: str = "127.0.0.1", port: int = 0) -> AsyncIterator[str]:
+async def serve_tcp(
+    device: SimulatedDevice, host: str = "127.0.0.1", port: int = 0, *, state: _File | None = None
+) -> AsyncIterator[str]:
     """
     Serve a device on TCP; gives its ``tcp://`` URL. One connection at a time; a second one is hung up at once.
 
@@ -83,13 +102,24 @@ async def serve_tcp(device: SimulatedDevice, host: str = "127.0.0.1", port: int 
         device: What to serve.
         host: Address to listen on.
         port: Port number; 0 takes a free one.
+        state: File of what the device keeps without power: loaded first if it is there, saved when serving ends.
+
+    Raises:
+        TransportError: The port cannot be had, or the file cannot be used.
     """
     line = DeviceLine.of(device)
     connections: set[Connection] = set()
-    server = await asyncio.get_running_loop().create_server(lambda: Connection(line, connections), host, port)
     try:
-        port = server.sockets[0].getsockname()[1]
-        yield f"tcp://[{host}]:{port}" if ":" in host else f"tcp://{host}:{port}"
+        server = await asyncio.get_running_loop().create_server(lambda: Connection(line, connections), host, port)
+    except (OSError, OverflowError) as error:
+        raise TransportError(
+            f"the simulated device {device.name!r} cannot be served on {host} port {port}: {error}",
+            hint="take another port, or 0 for a free one",
+        ) from error
+    try:
+        with _kept(device, state):
+            port = server.sockets[0].getsockname()[1]
+            yield f"tcp://[{host}]:{port}" if ":" in host else f"tcp://{host}:{port}"
     finally:
         server.close()
         await _hang_up(connections)
@@ -97,37 +127,129 @@ async def serve_tcp(device: SimulatedDevice, host: str = "127.0.0.1", port: int 
 
 
 @asynccontextmanager
-async def serve_pty(device: SimulatedDevice) -> AsyncIterator[str]:
+async def serve_tcp_group(
+    devices: Mapping[str, SimulatedDevice], host: str = "127.0.0.1", port: int = 0, *, state: _File | None = None
+) -> AsyncIterator[Mapping[str, str]]:
+    """
+    Serve several devices on TCP, each on a port of its own, like :func:`serve_tcp`; gives their URLs by name.
+
+    Args:
+        devices: What to serve, by name.
+        host: Address to listen on.
+        port: Port number of the first; the others take those that follow, in the order of *devices*. 0: free ones.
+        state: Folder of what they keep without power, a file ``<name>.json`` each; it is made if it is not there.
+
+    Raises:
+        TransportError: A port cannot be had, or a file cannot be used; says which. Then nothing is served.
+    """
+    if len({id(device) for device in devices.values()}) < len(devices):
+        raise TransportError("a simulated device is there twice", hint="make one for each name")
+    if port and port + len(devices) - 1 > _LAST_PORT:
+        raise TransportError(f"there are no {len(devices)} ports from {port} on", hint="begin with a smaller one")
+    files = _files_in(state, devices)
+    async with AsyncExitStack() as stack:
+        urls: dict[str, str] = {}
+        for place, (name, device) in enumerate(devices.items()):
+            try:
+                served = serve_tcp(device, host, port + place if port else 0, state=files.get(name))
+                urls[name] = await stack.enter_async_context(served)
+            except TransportError as error:
+                raise TransportError(f"{name!r}: {error.what}", hint=error.hint) from error
+        yield urls
+
+
+@asynccontextmanager
+async def serve_pty(device: SimulatedDevice, *, state: _File | None = None) -> AsyncIterator[str]:
     """
     Serve a device on a pseudo-terminal; gives its ``serial://`` URL. Linux and macOS.
 
+    Args:
+        device: What to serve.
+        state: File of what the device keeps without power: loaded first if it is there, saved when serving ends.
+
     Raises:
-        TransportError: Somebody else is connected to the device.
+        TransportError: Somebody else is connected to the device, or the file cannot be used.
     """
     from .pseudo_terminal import PseudoTerminal  # noqa: PLC0415  # there are none on Windows
 
     terminal = PseudoTerminal(DeviceLine.of(device))
     try:
-        yield f"serial://{terminal.path}"
+        with _kept(device, state):
+            yield f"serial://{terminal.path}"
     finally:
         terminal.close()
 
 
 @asynccontextmanager
-async def serve_loopback(device: SimulatedDevice, name: str) -> AsyncIterator[str]:
+async def serve_loopback(device: SimulatedDevice, name: str, *, state: _File | None = None) -> AsyncIterator[str]:
     """
     Serve a device in memory; gives its ``loop://`` URL. One connection at a time; a second one is hung up at once.
 
+    Args:
+        device: What to serve.
+        name: Of the line: ``loop://name``.
+        state: File of what the device keeps without power: loaded first if it is there, saved when serving ends.
+
     Raises:
-        TransportError: Another listener has that name.
+        TransportError: Another listener has that name, or the file cannot be used.
     """
     line = DeviceLine.of(device)
     connections: set[Connection] = set()
     with await listen(name, lambda: Connection(line, connections)) as listener:
         try:
-            yield listener.url
+            with _kept(device, state):
+                yield listener.url
         finally:
             await _hang_up(connections)
+
+
+@contextmanager
+def _kept(device: SimulatedDevice, file: _File | None) -> Iterator[None]:
+    """Load the state of *device* if there is a file, and save it at the end."""
+    if file is None:
+        yield
+        return
+    if not isinstance(device, _Lasting):
+        raise TransportError(f"the simulated device {device.name!r} has no state to keep")
+    path = Path(file)
+    if (state := _state_in(path)) is not None:
+        device.load_state(state)
+    try:
+        yield
+    finally:
+        try:
+            write_state_file(path, device.save_state())
+        except OSError as error:
+            raise TransportError(f"the state of {device.name!r} cannot be saved: {error}") from error
+
+
+def _state_in(path: Path) -> dict[str, Any] | None:
+    """Read a state; None if there is no file yet, and one can be made."""
+    if not path.parent.is_dir():
+        raise TransportError(f"no state can be kept in {path}", hint=f"there is no folder {path.parent}")
+    if not path.exists():
+        return None
+    try:
+        return read_state_file(path)
+    except (OSError, ValueError) as error:
+        raise TransportError(f"no state can be loaded: {error}", hint="mend the file, or take it away") from error
+
+
+def _files_in(folder: _File | None, names: Mapping[str, object]) -> Mapping[str, Path]:
+    """Return the file of each name, in a folder that is there; those that exist can be loaded."""
+    if folder is None:
+        return {}
+    for name in names:
+        if not name or name.startswith(".") or Path(name).name != name:
+            raise TransportError(f"{name!r} can be no file name", hint="name the device otherwise, or keep no state")
+    try:
+        Path(folder).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise TransportError(f"the folder {folder} cannot be used: {error}") from error
+    files = {name: Path(folder) / f"{name}.json" for name in names}
+    for file in files.values():
+        _state_in(file)
+    return files
 
 
 async def _hang_up(connections: set[Connection]) -> None:

@@ -87,6 +87,7 @@ class Axis:
         self._move: Move | None = None
         self._profile: Profile | None = None
         self._outcome = Outcome.REACHED
+        self._catches_up = 1.0
         self._due: list[tuple[float, Comparator]] = []
 
     @property
@@ -109,8 +110,7 @@ class Axis:
         """Return where the axis is: it lags behind while it moves, and has caught up when it stands."""
         if self._move is None or self._profile is None:
             return self._rest
-        lag_s = min(self._time_lag_s, max(0.0, self._profile.end - now))
-        return self._move.position(self._profile.distance(now - lag_s))
+        return self._move.position(self._profile.distance(now - self._lag_s(now)))
 
     def speed(self, now: float) -> float:
         """Return the speed in units per second, negative towards smaller positions."""
@@ -124,24 +124,26 @@ class Axis:
         """Begin a positioning, or what is left of it, from standstill."""
         self._move = move
         self._outcome = Outcome.REACHED
-        self._follow(
-            plan(
-                start=now,
-                length=move.length,
-                speed=move.speed,
-                acceleration=move.acceleration,
-                deceleration=move.deceleration,
-                steps=move.steps,
-                travelled=move.travelled,
-            )
-        )
+        self._catches_up = 1.0
+        self._follow(_planned(move, now, move.travelled, 0.0))
+
+    def change_speed(self, speed: float, now: float) -> None:
+        """Go on at *speed* in units per second until the next step ahead; after STOP that is for what START does."""
+        assert self._move is not None
+        assert self._profile is not None
+        travelled = self._profile.distance(now)
+        ahead = (step for step in self._move.steps if step.distance > travelled)
+        self._move = replace(self._move, steps=(SpeedStep(travelled, speed), *ahead))
+        if self._outcome is Outcome.REACHED:
+            later = _planned(self._move, now, travelled, self._profile.speed(now))
+            self._go_over_to(self._profile.followed_by(later, since=now - self._time_lag_s), now)
 
     def stop(self, now: float, deceleration: float, outcome: Outcome) -> None:
         """End the positioning under way before its target; a second stop only changes what comes after it."""
         if self._profile is None:
             return
         if self._outcome is Outcome.REACHED:
-            self._follow(self._profile.stopped(now, deceleration))
+            self._go_over_to(self._profile.stopped(now, deceleration), now)
         self._outcome = outcome
 
     def freeze(self, now: float) -> MoveEnded | None:
@@ -172,6 +174,17 @@ class Axis:
         self._move = replace(self._move, comparators=ahead)
         return ComparatorPassed(passed)
 
+    def _lag_s(self, now: float) -> float:
+        """Return the time by which the axis lags behind; it has caught up at the end."""
+        assert self._profile is not None
+        return min(self._time_lag_s, self._catches_up * max(0.0, self._profile.end - now))
+
+    def _go_over_to(self, profile: Profile, now: float) -> None:
+        """Follow another profile on the way; the axis goes on lagging as it did, so that its position never jumps."""
+        lag_s, left_s = self._lag_s(now), profile.end - now
+        self._catches_up = lag_s / left_s if left_s > 0 and min(lag_s, left_s) < self._time_lag_s else 1.0
+        self._follow(profile)
+
     def _follow(self, profile: Profile) -> None:
         """Go on with *profile*, and look when it passes the comparators ahead."""
         assert self._move is not None
@@ -197,3 +210,17 @@ class Axis:
     @property
     def _direction(self) -> int:
         return -1 if self._move is not None and self._move.target < self._move.origin else 1
+
+
+def _planned(move: Move, start: float, travelled: float, speed: float) -> Profile:
+    """Plan what is left of *move*."""
+    return plan(
+        start=start,
+        length=move.length,
+        speed=move.speed,
+        acceleration=move.acceleration,
+        deceleration=move.deceleration,
+        steps=move.steps,
+        travelled=travelled,
+        speed_now=speed,
+    )

@@ -1,11 +1,12 @@
-"""What a received line does: function signs, the intermediate memory, queries and commands."""
+"""What a received line or frame does: function signs, the intermediate memory, queries and commands."""
 
 from __future__ import annotations
 
+from .binary import line_of
 from .instructions import ExecuteStored, MoveBy, MoveHome, MoveTo, Query, Start, Statement
 from .language import parse
 from .machine import Machine
-from .port import ReceivedLine
+from .port import Received, ReceivedFrame
 from .readings import reading
 from .refusals import STORE_EMPTY, SYNTAX, RefusedError
 
@@ -26,9 +27,12 @@ class Console:
         self.began_motion = False
         """The last line may have set the axis in motion."""
 
-    def respond(self, line: ReceivedLine, now: float) -> str | None:
+    def respond(self, received: Received, now: float) -> str | None:
         """
-        Carry out a line; return the answer, None for none.
+        Carry out a line or a frame; return the answer, None for none.
+
+        A frame is carried out as the line that says the same, so that it is refused for the same reasons. It has no
+        function signs (UG p. 166).
 
         Raises:
             RefusedError: It is not possible.
@@ -37,13 +41,11 @@ class Console:
         stored = self._stored
         if self._knobs.store == "until_next_line":
             self._stored = None
-        if line.too_long:
-            raise RefusedError(SYNTAX)
-        text = line.text.upper() if self._knobs.lower_case == "folded" else line.text
-        statement = parse(text, self._machine.context())
+        text = self._text(received)
+        statement = parse(text.upper() if self._knobs.lower_case == "folded" else text, self._machine.context())
         if statement.stores:
             self._stored = statement
-            return line.text if statement.echoes else ""
+            return text if statement.echoes else ""
         if isinstance(statement.instruction, ExecuteStored):
             if stored is None:
                 raise RefusedError(STORE_EMPTY)
@@ -54,7 +56,17 @@ class Console:
         # Whether an echoed line also answers is open (row 11): here the echo is the answer, unless it is refused.
         if self._knobs.echo_sign == "echo_and_execute":
             self._carry_out(statement, now)
-        return line.text
+        return text
+
+    def _text(self, received: Received) -> str:
+        text: str | None
+        if isinstance(received, ReceivedFrame):
+            text = line_of(received.raw, self._machine.decimals)
+        else:
+            text = None if received.too_long else received.text
+        if text is None:
+            raise RefusedError(SYNTAX)
+        return text
 
     def _carry_out(self, statement: Statement, now: float) -> str | None:
         instruction = statement.instruction

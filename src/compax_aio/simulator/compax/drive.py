@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from enum import Enum, auto
-from typing import Final
-
-from compax_aio.compax.facts.line import COMMAND_END
+from typing import Any, Final
 
 from ..line import Host
 from . import replies
+from .binary import shown
 from .console import Console
 from .inputs import Inputs
 from .knobs import Knobs
 from .log import Log, LogKind
 from .machine import Machine, Message, MessageKind
-from .port import ReceivedLine, SerialPort
+from .port import Received, ReceivedFrame, ReceivedLine, SerialPort
 from .refusals import RefusedError
+from .state import read_state, written_state
 
 __all__ = ["SimulatedDrive"]
 
@@ -74,7 +74,7 @@ class SimulatedDrive:
         self._machine = Machine(self.knobs, self.log)
         self._port = SerialPort(self.knobs)
         self._console = Console(self._machine)
-        self._port.set_xonxoff(self._machine.xonxoff, 0.0)
+        self._heed_p20()
         self._machine.inputs.before_change = lambda: self._run(self._time(None))
         self._powered = True
         self._forget_conversation()
@@ -166,6 +166,33 @@ class SimulatedDrive:
                 self._machine.memory.write(record, text.upper(), self._machine.decimals)
             except RefusedError as refused:
                 raise ValueError(f"N{record:03d}: {text!r} is refused: {refused}") from None
+
+    def save_state(self, now: float | None = None) -> dict[str, Any]:
+        """
+        Return what this drive keeps without power, as plain data; it goes on as it was.
+
+        That is what a real one keeps, as far as known: valid parameters, the program and the error history; by choice
+        variables and the counts of S9 and S10, too. Unlike a real one it also remembers its axis. Knobs are no state.
+        """
+        self._run(self._time(now))
+        return written_state(self._machine.kept(self._now))
+
+    def load_state(self, state: Mapping[str, Any], now: float | None = None) -> None:
+        """
+        Switch off and on, and have kept *state*: of :meth:`save_state`, or of :func:`.read_state_file`.
+
+        Parameters that are not in it are as the knobs say. An error that was present is closed with 98 (UG p. 209).
+
+        Raises:
+            ValueError: It is no such state, or holds something that no drive can keep; then nothing has changed.
+        """
+        kept = read_state(state)
+        self._run(self._time(now))
+        self.power_off(now)
+        self.power_on(now)
+        self._machine.put_back(kept, self._now)
+        self._heed_p20()
+        self._changed()
 
     @property
     def fault(self) -> int | None:
@@ -266,6 +293,7 @@ class SimulatedDrive:
 
     def _machine_event(self) -> None:
         what = self._machine.step(self._now)
+        self._heed_p20()  # a record of the program may have written it
         if what is None:
             return
         if what.kind is MessageKind.POSITION_REACHED and self.delay_position_reached_s > 0:
@@ -287,7 +315,7 @@ class SimulatedDrive:
     def _forget_conversation(self) -> None:
         self._turn = _Turn.READY
         self._prepared_at = 0.0
-        self._line = ReceivedLine("", too_long=False)
+        self._line: Received = ReceivedLine("", too_long=False)
         self._answer: str | None = None
         self._answer_mark = 0
         self._answer_is_of_motion = False
@@ -298,15 +326,16 @@ class SimulatedDrive:
     def _take_line(self) -> None:
         if self._turn is not _Turn.READY:
             return
-        line = self._port.next_line()
+        line = self._port.next_received()
         if line is None:
             return
         self._line = line
         self._prepared_at = self._now + self.knobs.answer_time_s
         self._turn = _Turn.PREPARING
-        self.log.add(self._now, LogKind.LINE, line.text)
+        text = shown(line.raw, self._machine.decimals) if isinstance(line, ReceivedFrame) else line.text
+        self.log.add(self._now, LogKind.LINE, text)
         if self.knobs.echo and not self.silent:
-            self._port.send(line.text.encode("latin-1") + COMMAND_END, self._now)
+            self._port.send(line.raw, self._now)
 
     def _turn_event(self) -> None:
         if self._turn is _Turn.PREPARING:
@@ -361,4 +390,9 @@ class SimulatedDrive:
         except RefusedError as refused:
             self._answer = replies.error_text(refused.refusal, self.knobs, suppressed=suppressed)
         self._answer_is_of_motion = self._console.began_motion
+        self._heed_p20()
+
+    def _heed_p20(self) -> None:
+        """Let the port work as the valid P20 says; to be called whenever that may have changed."""
         self._port.set_xonxoff(self._machine.xonxoff, self._now)
+        self._port.set_binary(self._machine.binary)

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterable
+from typing import Final
 
 from compax_aio.compax.facts.device_errors import FAULT_CODES, HISTORY_ACKNOWLEDGED, HISTORY_POWERED_ON
 
-__all__ = ["FaultMemory"]
+__all__ = ["STAGES", "FaultMemory"]
 
-_STAGES = 8
+STAGES: Final = 8
+"""Of the history."""
 
 
 class FaultMemory:
@@ -19,7 +22,7 @@ class FaultMemory:
         """E1-E57: positioning is refused until it is acknowledged."""
         self.warning: int | None = None
         """Any higher code."""
-        self._history: deque[int] = deque([0] * _STAGES, maxlen=_STAGES)
+        self._history: deque[int] = deque([0] * STAGES, maxlen=STAGES)
 
     @property
     def present(self) -> int | None:
@@ -46,6 +49,13 @@ class FaultMemory:
     def powered_on(self) -> None:
         """Clear what is present, by switching off and on."""
         self._clear(HISTORY_POWERED_ON)
+
+    def remember(self, history: Iterable[int], *, unclosed: bool) -> None:
+        """Take another history, newest first; the power went off while an error was present, or not."""
+        self.fault = self.warning = None
+        self._history = deque(history, maxlen=STAGES)
+        if unclosed:
+            self._history.appendleft(HISTORY_POWERED_ON)
 
     def _clear(self, mark: int) -> None:
         if self.present is not None:

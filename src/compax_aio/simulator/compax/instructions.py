@@ -8,6 +8,7 @@ __all__ = [
     "Acceleration",
     "Assign",
     "Break",
+    "ChangeSpeed",
     "Deceleration",
     "ExecuteStored",
     "Instruction",
@@ -15,6 +16,7 @@ __all__ = [
     "MoveBy",
     "MoveHome",
     "MoveTo",
+    "NotSimulated",
     "Nothing",
     "Operand",
     "Outputs",
@@ -24,6 +26,7 @@ __all__ = [
     "PreparedSpeed",
     "Query",
     "Quit",
+    "RealZero",
     "SetPointer",
     "Single",
     "Speed",
@@ -55,9 +58,18 @@ class MoveHome:
 
 @dataclass(frozen=True, slots=True)
 class PreparedSpeed:
-    """POSR d SPEED v."""
+    """POSR d SPEED v, or POSR d SPEED v ACCEL t."""
 
     distance: float
+    percent: float
+    time_ms: int | None = None
+    """Of the step's own ramp."""
+
+
+@dataclass(frozen=True, slots=True)
+class ChangeSpeed:
+    """POSR 0 SPEED v: the positioning that runs goes on at another speed."""
+
     percent: float
 
 
@@ -180,9 +192,9 @@ class WriteRecord:
 
 @dataclass(frozen=True, slots=True)
 class SetPointer:
-    """GOTO n: START begins there."""
+    """GOTO n or GOTO EXT: START begins there; no record means EXT, which the inputs choose."""
 
-    record: int
+    record: int | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,6 +202,18 @@ class Single:
     """SINGLE n: execute one record."""
 
     record: int
+
+
+@dataclass(frozen=True, slots=True)
+class RealZero:
+    """Take the place where the axis is as real zero."""
+
+
+@dataclass(frozen=True, slots=True)
+class NotSimulated:
+    """What the manuals name and do not explain, or what takes a variant that this is not."""
+
+    word: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,6 +231,7 @@ Instruction = (
     | MoveBy
     | MoveHome
     | PreparedSpeed
+    | ChangeSpeed
     | PreparedOutput
     | Speed
     | Acceleration
@@ -224,6 +249,8 @@ Instruction = (
     | WriteRecord
     | SetPointer
     | Single
+    | RealZero
+    | NotSimulated
     | ExecuteStored
     | Nothing
 )

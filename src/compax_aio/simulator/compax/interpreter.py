@@ -191,10 +191,11 @@ class Interpreter:
         if self.pointer not in RECORDS or (self._executed and self._pointer_after_single is not None):
             self._end("ended", now)
             return
+        here = self.pointer
         try:
-            self._execute(does.read_record(self._memory[self.pointer], self._body.context()), now)
+            self._execute(does.read_record(self._memory[here], self._body.context()), now)
         except RefusedError as refused:
-            self._body.program_event(f"N{self.pointer:03d} refused: {refused}", now)
+            self._body.program_event(f"N{here:03d} refused: {refused}", now)
             self._body.program_failed(refused.refusal, now)
 
     # One record
@@ -215,6 +216,11 @@ class Interpreter:
                     self._end("ended", now)
                     return
             case does.Wait(time_ms):
+                self.pointer = here + 1
+                self._next(now, time_ms / 1000)
+                return
+            case does.SpeedThenWait(speed, time_ms):
+                self._body.execute(speed, False, now)
                 self.pointer = here + 1
                 self._next(now, time_ms / 1000)
                 return
@@ -256,7 +262,7 @@ class Interpreter:
         self._state = _State.POSITIONING
 
     def _jump(self, jump: does.Jump, back: int) -> None:
-        record = self._chosen_by_inputs() if jump.record is None else jump.record
+        record = self.record_of_inputs() if jump.record is None else jump.record
         if jump.calls:
             if len(self._levels) > _MAX_DEPTH:
                 raise RefusedError(NESTING)
@@ -267,8 +273,13 @@ class Interpreter:
                 loops.pop()
         self.pointer = record
 
-    def _chosen_by_inputs(self) -> int:
-        """Return the record that I9-I16 give as a binary number, I9 counting 1; which inputs do is a placeholder."""
+    def record_of_inputs(self) -> int:
+        """
+        Return the record that I9-I16 give as a binary number, I9 counting 1; which inputs do is a placeholder.
+
+        Raises:
+            RefusedError: There is none of that number.
+        """
         record = sum(self._body.inputs[9 + bit] << bit for bit in range(8))
         if record not in RECORDS:
             raise RefusedError(NO_RECORD)

@@ -5,11 +5,13 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
+import re
 import typing
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, Self
 
+from compax_aio.compax.facts.commands import COMMANDS
 from compax_aio.compax.facts.limits import MAX_ACCELERATION_TIME_MS, MAX_POSITION, MAX_SPEED_PERCENT
 from compax_aio.errors import TransportError
 
@@ -23,6 +25,22 @@ class _Range:
 
     def __str__(self) -> str:
         return f"{self.low:g} to {self.high:g}"
+
+    def allows(self, value: float) -> bool:
+        return math.isfinite(value) and self.low <= value <= self.high
+
+
+class _NewWord:
+    """A word that means nothing else; what it is at the line, blanks mean nothing."""
+
+    _FORM = re.compile("[A-Z][A-Z ]{0,18}[A-Z]")
+    _TAKEN = frozenset({"VP", "VC", *(form.replace(" ", "") for row in COMMANDS for form in (row.long, row.short))})
+
+    def __str__(self) -> str:
+        return "2 to 20 capitals, no command that has another meaning"
+
+    def allows(self, value: str) -> bool:
+        return self._FORM.fullmatch(value) is not None and value.replace(" ", "") not in self._TAKEN
 
 
 _Position = Annotated[float, _Range(-MAX_POSITION, MAX_POSITION)]
@@ -94,6 +112,9 @@ class Knobs:
     """A parameter that waits for VP reads as it was written; or as it is still valid."""
     trailing_zeros: Literal["not_control", "all", "none"] = "not_control"
     """All decimals that are stored in parameters but P40-P49, ``P002: 100.000``; in variables too; or in none."""
+
+    real_zero_word: Annotated[str, _NewWord()] = "REALZERO"
+    """Takes the place where the axis is as real zero: the function exists (CAN p. 32), its word is a placeholder."""
 
     # The line and the processor
 
@@ -178,10 +199,6 @@ def _fields() -> Mapping[str, _Field]:
 def _field(hint: Any) -> _Field:
     if typing.get_origin(hint) is Annotated:
         kind, limits = typing.get_args(hint)
-        return kind, functools.partial(_is_within, limits), str(limits)
+        return kind, limits.allows, str(limits)
     values = {"0": False, "1": True} if hint is bool else {str(value): value for value in typing.get_args(hint)}
     return values.__getitem__, list(values.values()).__contains__, ", ".join(values)
-
-
-def _is_within(limits: _Range, value: float) -> bool:
-    return math.isfinite(value) and limits.low <= value <= limits.high

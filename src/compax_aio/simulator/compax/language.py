@@ -22,6 +22,7 @@ from .instructions import (
     Acceleration,
     Assign,
     Break,
+    ChangeSpeed,
     Deceleration,
     ExecuteStored,
     Instruction,
@@ -30,6 +31,7 @@ from .instructions import (
     MoveHome,
     MoveTo,
     Nothing,
+    NotSimulated,
     Operand,
     Outputs,
     Password,
@@ -38,6 +40,7 @@ from .instructions import (
     PreparedSpeed,
     Query,
     Quit,
+    RealZero,
     SetPointer,
     Single,
     Speed,
@@ -49,7 +52,11 @@ from .instructions import (
 from .parameters import CONTROL_PARAMETERS, FREE_VARIABLES
 from .refusals import NUMBER, SYNTAX, RefusedError
 
-__all__ = ["OPERAND", "Context", "calculated", "instruction", "number", "operand", "parse"]
+__all__ = ["MAX_COUNT", "OPERAND", "Context", "calculated", "instruction", "number", "operand", "parse"]
+
+
+MAX_COUNT: Final = 8_388_607
+"""Of WAIT, REPEAT and LOOP: 24 bits with sign stand before the point of a number (UG p. 167); inferred."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +67,8 @@ class Context:
     """How many a position may have."""
     value: Callable[[str, int], float] | None
     """Says what ``.P40`` or ``.V5`` stands for now; None where only the form matters, as when a record is written."""
+    real_zero: str = ""
+    """The word that takes real zero, without blanks; empty where there is none, as in records."""
 
 
 def parse(text: str, context: Context) -> Statement:
@@ -89,10 +98,8 @@ def instruction(text: str, context: Context) -> Instruction:
     Raises:
         RefusedError: It means nothing, or has a number that is out of range.
     """
-    if not text:
-        return Nothing()
-    if text == EXECUTE_SIGN:
-        return ExecuteStored()
+    if text in {"", EXECUTE_SIGN, context.real_zero}:
+        return _alone_standing(text)
     if found := _QUERY.fullmatch(text):
         return Query(found["kind"], int(found["number"]))
     if found := _ASSIGNMENT.fullmatch(text):
@@ -104,6 +111,12 @@ def instruction(text: str, context: Context) -> Instruction:
         if text.startswith(word):
             return _READERS[long](text[len(word) :], context)
     raise RefusedError(SYNTAX)
+
+
+def _alone_standing(text: str) -> Instruction:
+    if not text:
+        return Nothing()
+    return ExecuteStored() if text == EXECUTE_SIGN else RealZero()
 
 
 def operand(text: str) -> Operand:
@@ -165,31 +178,49 @@ def _home(text: str, _: Context) -> Instruction:
 
 
 def _posr(text: str, context: Context) -> Instruction:
+    if text == "CAM":
+        return NotSimulated("POSR CAM")
     point = _POINT.fullmatch(text)
     if point is None:
         return MoveBy(_position(text, context))
     # A distance from the start in the direction of travel, always positive (UG p. 101).
     distance = _position(point["distance"], context)
+    if point["percent"] is not None:
+        return _step(distance, point, context)
     if distance <= 0:
         raise RefusedError(NUMBER)
-    if point["percent"] is not None:
-        return PreparedSpeed(distance, number(point["percent"], context, 0, 1, MAX_SPEED_PERCENT))
     output = int(point["output"])
     if output not in OUTPUT_NUMBERS:
         raise RefusedError(NUMBER)
     return PreparedOutput(distance, output, point["value"] == "1")
 
 
+def _step(distance: float, point: re.Match[str], context: Context) -> Instruction:
+    """Read a speed step; at no distance it changes the speed under way, by the name of the object of IBS p. 42."""
+    percent = number(point["percent"], context, 0, 1, MAX_SPEED_PERCENT)
+    if distance == 0 and point["ramp"] is None:
+        return ChangeSpeed(percent)
+    if distance <= 0:
+        raise RefusedError(NUMBER)
+    return PreparedSpeed(distance, percent, None if point["ramp"] is None else _time_ms(point["ramp"], context))
+
+
 def _speed(text: str, context: Context) -> Instruction:
+    if text == "SYNC":
+        return NotSimulated("SPEED SYNC")
     return Speed(number(text, context, SPEED_DECIMALS, 0.001, MAX_SPEED_PERCENT))
 
 
 def _acceleration(text: str, context: Context) -> Instruction:
-    return Acceleration(int(number(text, context, 0, 0, MAX_ACCELERATION_TIME_MS)))
+    return Acceleration(_time_ms(text, context))
 
 
 def _deceleration(text: str, context: Context) -> Instruction:
-    return Deceleration(int(number(text, context, 0, 0, MAX_ACCELERATION_TIME_MS)))
+    return Deceleration(_time_ms(text, context))
+
+
+def _time_ms(text: str, context: Context) -> int:
+    return int(number(text, context, 0, 0, MAX_ACCELERATION_TIME_MS))
 
 
 def _output(text: str, _: Context) -> Instruction:
@@ -207,7 +238,14 @@ def _output(text: str, _: Context) -> Instruction:
 def _goto(text: str, _: Context) -> Instruction:
     if text in {"302", "270", "620"}:
         return Password(int(text))
+    if text == "EXT":
+        return SetPointer(None)
     return SetPointer(_record_number(text))
+
+
+def _loop(text: str, context: Context) -> Instruction:
+    number(text, context, 0, 1, MAX_COUNT)
+    return NotSimulated("LOOP")
 
 
 def _record_number(text: str) -> int:
@@ -235,6 +273,7 @@ _READERS: Final[Mapping[str, Callable[[str, Context], Instruction]]] = {
     "BREAK": lambda text, _: _alone(text, Break()),
     "QUIT": lambda text, _: _alone(text, Quit()),
     "GOTO": _goto,
+    "LOOP": _loop,
     "SINGLE": lambda text, _: Single(_record_number(text)),
     "VP": lambda text, _: _alone(text, MakeValid("VP")),
     "VC": lambda text, _: _alone(text, MakeValid("VC")),
@@ -255,6 +294,8 @@ _ALIASES: Final = {
     "GOTO": "GOTO",
     "VP": "VP",
     "VC": "VC",
+    # A positioning command (UG p. 162) whose meaning stands on no page at hand.
+    "LOOP": "LOOP",
 }
 
 _WORDS: Final = sorted(
@@ -287,7 +328,8 @@ _OPERATORS: Final[Mapping[str, Callable[[float, float], float]]] = {
 _RECORD: Final = re.compile(r"N(?P<number>[0-9]{1,3})(?::(?P<text>.+)|(?P<bare>[^0-9:].*))")
 _QUERY: Final = re.compile(r"(?P<kind>[SPVN])(?P<number>[0-9]{1,5})")
 _POINT: Final = re.compile(
-    rf"(?P<distance>[^A-Z]+|\.[PV][0-9]+)(?:(?:{_forms('SPEED')})(?P<percent>.+)"
+    rf"(?P<distance>[^A-Z]+|\.[PV][0-9]+)(?:(?:{_forms('SPEED')})(?P<percent>[^A-Z]+|\.[PV][0-9]+)"
+    rf"(?:(?:{_forms('ACCEL')})(?P<ramp>.+))?"
     rf"|(?:{_forms('OUTPUT')})O(?P<output>[0-9]{{1,2}})=(?P<value>[01]))"
 )
 _OUTPUT: Final = re.compile(r"O(?P<output>[0-9]{1,2})=(?P<values>[0-9]{1,8})")

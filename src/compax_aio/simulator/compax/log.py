@@ -16,7 +16,7 @@ class LogKind(StrEnum):
     """What a log entry tells of, and how its text is formed."""
 
     LINE = "line"
-    """A complete line is being processed; the text as received, without CR."""
+    """A complete line is being processed, the text as received, without CR; or a frame, ``84 4C 00 FA (ACCEL 250)``."""
     ANSWER = "answer"
     """An answer begins on the wire; its text without prompt."""
     MESSAGE = "message"
@@ -27,6 +27,8 @@ class LogKind(StrEnum):
     """A positioning began; command word and target: ``POSA 100.00``."""
     MOTION_CONTINUED = "motion_continued"
     """START continued a stopped positioning; command word and target."""
+    SPEED_CHANGED = "speed_changed"
+    """A positioning goes on at another speed; in % of nominal speed: ``30``."""
     MOTION_REACHED = "motion_reached"
     """The axis stands at its target; the position."""
     MOTION_STOPPED = "motion_stopped"

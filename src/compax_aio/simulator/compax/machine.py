@@ -2,37 +2,39 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum
-from typing import Final
 
 from compax_aio.compax.facts.device_errors import FAULT_CODES
-from compax_aio.compax.facts.limits import POSITION_DECIMALS, POSITION_DECIMALS_INCH
 from compax_aio.compax.facts.line import POSITION_REACHED_SIGN
 
 from . import instructions as say
-from .axis import Axis, ComparatorPassed, Move, MoveEnded, Outcome
+from .axis import Axis, ComparatorPassed, MoveEnded, Outcome
 from .faults import FaultMemory
 from .inputs import Inputs
 from .interpreter import Interpreter
 from .knobs import Knobs
 from .language import Context, calculated
 from .log import Log, LogKind
-from .motion import ramp
-from .parameters import CONTROL_PARAMETERS, UNITS, Parameters
+from .parameters import CONTROL_PARAMETERS, Parameters
+from .positioning import Positioning
 from .preparation import Preparation
 from .program import RECORDS, Memory
 from .quantities import status_number
-from .refusals import FAULTED, MOVE_ACTIVE, NO_RECORD, PASSWORD, POWER_OFF, PROGRAM_RUNS, TRAVEL, Refusal, RefusedError
+from .refusals import (
+    FAULTED,
+    MOVE_ACTIVE,
+    NO_RECORD,
+    NOT_SIMULATED,
+    PASSWORD,
+    POWER_OFF,
+    PROGRAM_RUNS,
+    Refusal,
+    RefusedError,
+)
+from .state import Kept
 
 __all__ = ["Machine", "Message", "MessageKind"]
-
-_ENDINGS: Final = {
-    Outcome.REACHED: LogKind.MOTION_REACHED,
-    Outcome.STOPPED: LogKind.MOTION_STOPPED,
-    Outcome.BROKEN: LogKind.MOTION_STOPPED,
-    Outcome.FAULT: LogKind.MOTION_FAULT,
-}
 
 
 class MessageKind(Enum):
@@ -56,34 +58,34 @@ class Machine:
     def __init__(self, knobs: Knobs, log: Log) -> None:
         self.knobs = knobs
         self.log = log
-        self.axis: Axis = Axis(knobs.position, knobs.following_error_factor)
         self.faults = FaultMemory()
         self.parameters = Parameters(knobs)
-        self.preparation = Preparation(knobs, self.parameters)
+        self.positioning: Positioning = Positioning(knobs, log, self.parameters)
+        self.axis: Axis = self.positioning.axis
+        self.preparation: Preparation = self.positioning.preparation
         self.memory = Memory()
         self.program: Interpreter = Interpreter(self, self.memory, knobs.record_time_s)
         self.inputs = Inputs()
-        self.homed = knobs.homed
-        self.target: float = knobs.position
         self.outputs = dict.fromkeys(range(1, 17), False)
         self.power_mode = 0
         """Set with OUTPUT O0: 0 energised, 1 off with the brake closed, 2 off with the brake open."""
         self.password = False
         self.service_password = False
-        self.position_reached = False
         self.idle_after_stop = False
-        self.cycles: int = 0
-        self._zero = 0.0 if knobs.homed else knobs.position + knobs.machine_zero
+        self._operated_before_s = 0.0
         self._self_test_until = 0.0
-        self._stopped: Move | None = None
-        self._continues = False
 
     # What it shows
 
     @property
     def moving(self) -> bool:
         """Whether a positioning runs, stop ramps included."""
-        return self.axis.move is not None
+        return self.positioning.moving
+
+    @property
+    def homed(self) -> bool:
+        """Whether machine zero has been found."""
+        return self.positioning.zero.homed
 
     @property
     def energised(self) -> bool:
@@ -97,19 +99,22 @@ class Machine:
     @property
     def unit(self) -> str:
         """What positions are counted in, by P90."""
-        return UNITS[int(self.parameters[90])]
+        return self.parameters.unit
 
     @property
     def decimals(self) -> int:
-        """Of positions and distances: those of the knob, until P90 chooses another unit (UG p. 100)."""
-        if self.unit == self.knobs.unit:
-            return self.knobs.decimals
-        return POSITION_DECIMALS_INCH if self.unit == "inch" else POSITION_DECIMALS
+        """Of positions and distances."""
+        return self.parameters.decimals
 
     @property
     def xonxoff(self) -> bool:
         """P20 bit 0."""
         return bool(int(self.parameters[20]) & 1)
+
+    @property
+    def binary(self) -> bool:
+        """P20 bit 4: commands as frames, in addition to lines."""
+        return bool(int(self.parameters[20]) & 16)
 
     @property
     def errors_suppressed(self) -> bool:
@@ -122,7 +127,11 @@ class Machine:
 
     def context(self) -> Context:
         """Return what it takes to read a command now."""
-        return Context(self.decimals, self.parameters.value)
+        return Context(self.decimals, self.parameters.value, self.knobs.real_zero_word.replace(" ", ""))
+
+    def operating_time_s(self, now: float) -> float:
+        """Return how long it has been working."""
+        return self._operated_before_s + now
 
     # What is done to it
 
@@ -139,7 +148,9 @@ class Machine:
             case say.MoveBy(distance):
                 self._move("POSR", self.axis.setpoint(now) + distance, reports, now)
             case say.MoveHome():
-                self._move("POSA HOME", self._zero, reports, now)
+                self._move("POSA HOME", self.positioning.zero.machine_zero, reports, now)
+            case say.ChangeSpeed(percent):
+                self.positioning.change_speed(percent, now)
             case say.Stop():
                 self._stop(Outcome.STOPPED, now)
             case say.Break():
@@ -171,16 +182,40 @@ class Machine:
         """Give the power back: the position is not known any more, settings are those of P2 and P6."""
         self.log.add(now, LogKind.POWER, "on")
         self.faults.powered_on()
-        self._zero -= self.axis.position(now)
-        self.axis.put(0.0)
-        self.target = 0.0
-        self.homed = self.position_reached = self.idle_after_stop = False
+        self.positioning.power_returns(now)
+        self.idle_after_stop = False
         self.password = self.service_password = False
         self.outputs = dict.fromkeys(self.outputs, False)
         self.power_mode = 0
         self._self_test_until = now + self.knobs.self_test_s
         self.parameters.forget_written()
-        self._default_settings()
+
+    # What is kept without power
+
+    def kept(self, now: float) -> Kept:
+        """Return what is kept if the power goes off now; also where the axis is, which a real drive forgets."""
+        return Kept(
+            parameters=self.parameters.changed,
+            variables=self.parameters.changed_variables,
+            program=self.memory.written,
+            error_history=self.faults.history,
+            error_present=self.faults.present is not None,
+            position=self.axis.position(now),
+            machine_zero=self.positioning.zero.machine_zero,
+            homed=self.homed,
+            cycles=self.positioning.cycles,
+            operating_time_s=self.operating_time_s(now),
+        )
+
+    def put_back(self, kept: Kept, now: float) -> None:
+        """Have been a drive that kept this; for one that has just got its power back."""
+        self.parameters.replace(kept.parameters, kept.variables)
+        self.memory.replace(kept.program)
+        self.program.pointer = 1
+        self.faults.remember(kept.error_history, unclosed=kept.error_present)
+        self.positioning.put(kept.position, kept.machine_zero, homed=kept.homed)
+        self.positioning.cycles = kept.cycles
+        self._operated_before_s = kept.operating_time_s - now
 
     # What comes by itself
 
@@ -211,75 +246,42 @@ class Machine:
         return Message(MessageKind.COMPARATOR, str(comparator.number))
 
     def _ended(self, event: MoveEnded, now: float) -> Message | None:
-        move, reached = event.move, event.outcome is Outcome.REACHED
-        if reached:
-            self.position_reached = True
-            if move.homing:
-                self._home_found()
         self.idle_after_stop = event.outcome in {Outcome.STOPPED, Outcome.BROKEN}
-        self.log.add(now, _ENDINGS[event.outcome], self._written(self.axis.position(now)))
-        says = move.reports and (reached or self.knobs.position_reached_on_stop)
-        if event.outcome is Outcome.STOPPED:
-            self._stopped = replace(move, reports=move.reports and not says)
-        self.program.axis_stands(reached, now)
-        if self._continues:
+        says = self.positioning.ended(event, now)
+        self.program.axis_stands(event.outcome is Outcome.REACHED, now)
+        if self.positioning.continues:
             self._start(now)
         return Message(MessageKind.POSITION_REACHED, POSITION_REACHED_SIGN) if says else None
-
-    def _home_found(self) -> None:
-        self._zero = self.target = 0.0
-        self.axis.put(0.0)
-        self.homed = True
 
     # Positioning
 
     def _move(self, word: str, target: float, reports: bool, now: float) -> None:
         if not self.is_ready(now):
             raise RefusedError(FAULTED)
-        if self.moving:
-            raise RefusedError(MOVE_ACTIVE)
-        if self.power_mode != 0:
+        if self.power_mode != 0 and not self.moving:
             raise RefusedError(POWER_OFF)
-        homing = word == "POSA HOME"
-        if not homing and not self.parameters[12] <= target <= self.parameters[11]:
-            raise RefusedError(TRAVEL)
-        move = self.preparation.move(word, self.axis.setpoint(now), target, reports)
-        self.target = target
-        self.cycles += 1
-        if homing:
-            self.homed = False
-        self._run(move, LogKind.MOTION_STARTED, now)
-
-    def _run(self, move: Move, kind: LogKind, now: float) -> None:
-        self._stopped = None
-        self._continues = False
-        self.position_reached = self.idle_after_stop = False
-        self.log.add(now, kind, f"{move.word} {self._written(move.target)}")
-        self.axis.start(move, now)
+        self.positioning.start(word, target, reports, now)
+        self.idle_after_stop = False
 
     def _stop(self, outcome: Outcome, now: float) -> None:
-        # BREAK and faults also end what STOP has stopped; a fault is not made milder by a later STOP.
-        self._continues = False
         if outcome is Outcome.STOPPED:
             self.program.stop(now)
             self.idle_after_stop |= self.program.paused and not self.moving
         else:
-            self._stopped = None
             (self.program.break_off if outcome is Outcome.BROKEN else self.program.error)(now)
-        if self.axis.outcome is Outcome.FAULT or (self.axis.outcome is Outcome.BROKEN and outcome is Outcome.STOPPED):
-            return
-        self.axis.stop(now, ramp(self.knobs.nominal_speed, self.parameters[10]), outcome)
+        self.positioning.stop(outcome, now)
 
     def _start(self, now: float) -> None:
-        if self.moving and self.axis.outcome is not Outcome.REACHED:
-            self._continues = self.axis.outcome is Outcome.STOPPED
-        elif self._stopped is None:
+        if self.positioning.braking_off:
+            self.positioning.continues = self.axis.outcome is Outcome.STOPPED
+        elif self.positioning.stopped is None:
             # Without a stopped positioning START goes to the program memory (UG p. 162).
             self.program.start(now)
         else:
             if self.power_mode != 0:
                 raise RefusedError(POWER_OFF)
-            self._run(self._stopped, LogKind.MOTION_CONTINUED, now)
+            self.positioning.go_on(now)
+            self.idle_after_stop = False
             if self.program.paused:
                 self.program.start(now)
 
@@ -296,14 +298,15 @@ class Machine:
         self.program.error(now)
 
     def _choose_record(self, instruction: say.SetPointer | say.Single, now: float) -> None:
-        if instruction.record not in RECORDS:
+        record = self.program.record_of_inputs() if instruction.record is None else instruction.record
+        if record not in RECORDS:
             raise RefusedError(NO_RECORD)
         if self.program.running or self.program.paused:
             raise RefusedError(PROGRAM_RUNS)
         if isinstance(instruction, say.Single):
-            self.program.start(now, only=instruction.record)
+            self.program.start(now, only=record)
         else:
-            self.program.pointer = instruction.record
+            self.program.pointer = record
 
     # The rest
 
@@ -335,6 +338,11 @@ class Machine:
                 self._assign(instruction, now)
             case say.MakeValid("VP"):
                 self.parameters.make_valid()
+                self.positioning.follow_real_zero(now)
+            case say.RealZero():
+                self.positioning.take_real_zero(now)
+            case say.NotSimulated():
+                raise RefusedError(NOT_SIMULATED)
             case _:  # an empty line does nothing; nor does VC, of which only the name is known
                 pass
 
@@ -357,11 +365,7 @@ class Machine:
         if assign.right is not None:
             value = calculated(assign.operator, value, self.operand(assign.right, now))
         self.parameters.write(assign.kind, assign.number, value)
-
-    def _default_settings(self) -> None:
-        self.preparation.forget()
-        self._stopped = None
-        self._continues = False
+        self.positioning.follow_real_zero(now)
 
     def _quit(self, now: float) -> None:
         if self.faults.present is not None:
@@ -385,6 +389,3 @@ class Machine:
             self.password = True
         else:
             self.service_password = True
-
-    def _written(self, position: float) -> str:
-        return f"{round(position, self.decimals) + 0.0:.{self.decimals}f}"

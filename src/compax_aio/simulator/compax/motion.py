@@ -26,6 +26,8 @@ class SpeedStep:
 
     distance: float
     speed: float
+    ramp: float | None = None
+    """Of the change to that speed, up or down; None: as the positioning accelerates and brakes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,19 +109,26 @@ class Profile:
     def stopped(self, at: float, deceleration: float) -> Profile:
         """Return this profile with a stop ramp from time *at* on, steeper if it would else pass the end."""
         distance, speed = self.distance(at), self.speed(at)
-        passed = [segment for segment in self.segments if segment.start < at]
-        if passed:
-            passed[-1] = replace(passed[-1], duration=min(passed[-1].duration, at - passed[-1].start))
         way = min(self.end_distance - distance, speed**2 / (2 * deceleration))
-        return _closed(
-            segments=passed,
-            start=self.start,
-            start_distance=self.start_distance,
-            at=at,
-            distance=distance,
-            speed=speed,
-            end_distance=distance + way,
+        return self.followed_by(
+            _closed(
+                segments=(),
+                start=at,
+                start_distance=distance,
+                at=at,
+                distance=distance,
+                speed=speed,
+                end_distance=distance + way,
+            )
         )
+
+    def followed_by(self, later: Profile, since: float = -math.inf) -> Profile:
+        """Return this profile until *later* begins, and that from then on; what ended before *since* is left out."""
+        passed = [each for each in self.segments if each.start < later.start and each.start + each.duration > since]
+        if not passed:
+            return later
+        passed[-1] = replace(passed[-1], duration=min(passed[-1].duration, later.start - passed[-1].start))
+        return Profile(passed[0].start, later.end, passed[0].distance, later.end_distance, (*passed, *later.segments))
 
     def _segment(self, at: float) -> Segment | None:
         if not self.start <= at < self.end:
@@ -141,20 +150,24 @@ def plan(
     deceleration: float,
     steps: Sequence[SpeedStep] = (),
     travelled: float = 0.0,
+    speed_now: float = 0.0,
 ) -> Profile:
     """
-    Plan a positioning over *length* from standstill, *travelled* of which lies behind already.
+    Plan a positioning over *length*, *travelled* of which lies behind already, from *speed_now* on.
+
+    From that speed it must be possible to brake for *length*.
 
     At the distance of each step the axis begins to change to the speed of that step; it always brakes early enough
     to stand exactly at *length*.
     """
     segments: list[Segment] = []
-    at, distance, now_speed = start, travelled, 0.0
+    at, distance, now_speed = start, travelled, speed_now
     for end, end_speed, rate in _stretches(
         length=length,
         speed=speed,
         steps=steps,
         travelled=travelled,
+        speed_now=speed_now,
         acceleration=acceleration,
         deceleration=deceleration,
     ):
@@ -174,17 +187,20 @@ def plan(
     )
 
 
-def _stages(length: float, speed: float, steps: Sequence[SpeedStep], travelled: float) -> Iterator[tuple[float, float]]:
-    """List the ends and speeds of the stretches between steps that still lie ahead."""
+def _stages(
+    length: float, speed: float, steps: Sequence[SpeedStep], travelled: float
+) -> Iterator[tuple[float, SpeedStep]]:
+    """List the stretches between steps that still lie ahead: where each ends, and the step that rules it."""
+    ruling = SpeedStep(0.0, speed)
     for step in sorted(steps, key=lambda step: step.distance):
         end = min(step.distance, length)
         if end > travelled:
-            yield end, speed
+            yield end, ruling
         if step.distance >= length:
             return
-        speed = step.speed
+        ruling = step
     if length > travelled:
-        yield length, speed
+        yield length, ruling
 
 
 def _stretches(
@@ -193,22 +209,24 @@ def _stretches(
     speed: float,
     steps: Sequence[SpeedStep],
     travelled: float,
+    speed_now: float,
     acceleration: float,
     deceleration: float,
 ) -> Iterator[tuple[float, float, float]]:
     """List what comes before the final braking: the end of each stretch, the speed there, and the acceleration."""
-    distance, now_speed = travelled, 0.0
-    for stage_end, stage_speed in _stages(length, speed, steps, travelled):
+    distance, now_speed = travelled, speed_now
+    for stage_end, stage in _stages(length, speed, steps, travelled):
+        stage_speed = stage.speed
         if now_speed != stage_speed:
-            rate = acceleration if now_speed < stage_speed else -deceleration
+            rate = (stage.ramp or acceleration) if now_speed < stage_speed else -(stage.ramp or deceleration)
             changed = distance + (stage_speed**2 - now_speed**2) / (2 * rate)
-            # Where this ramp meets the one that ends at the target; a braking axis is on a parallel to that one.
+            # Where this ramp meets the one that ends at the target; who brakes as hard or harder never meets it.
             meets = length
-            if rate > 0:
+            if rate + deceleration > 0:
                 meets = (2 * deceleration * length - now_speed**2 + 2 * rate * distance) / (2 * (rate + deceleration))
             end = max(distance, min(changed, meets, stage_end))
             if changed > end:
-                now_speed = math.sqrt(now_speed**2 + 2 * rate * (end - distance))
+                now_speed = math.sqrt(max(0.0, now_speed**2 + 2 * rate * (end - distance)))
                 distance = end
                 yield end, now_speed, rate
                 if meets <= stage_end:

@@ -5,12 +5,26 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from compax_aio.compax.facts.limits import MAX_ACCELERATION_TIME_MS, MAX_POSITION, MAX_SPEED_PERCENT
+from compax_aio.compax.facts.limits import (
+    MAX_ACCELERATION_TIME_MS,
+    MAX_POSITION,
+    MAX_SPEED_PERCENT,
+    POSITION_DECIMALS,
+    POSITION_DECIMALS_INCH,
+)
 
 from .knobs import Knobs
 from .refusals import NUMBER, SYNTAX, RefusedError
 
-__all__ = ["CONTROL_PARAMETERS", "FREE_VARIABLES", "UNITS", "VARIABLE_DECIMALS", "Parameters", "stored_decimals"]
+__all__ = [
+    "CONTROL_PARAMETERS",
+    "FREE_VARIABLES",
+    "UNITS",
+    "VARIABLE_DECIMALS",
+    "Parameters",
+    "stored",
+    "stored_decimals",
+]
 
 _NUMBERS: Final = range(1, 251)
 """P1-P250 (IBS p. 24)."""
@@ -61,15 +75,29 @@ class Parameters:
     """
 
     def __init__(self, knobs: Knobs) -> None:
+        self._knobs = knobs
         self._at_once = knobs.vp == "at_once"
         self._shows_valid = knobs.parameter_reading == "valid"
-        self._valid = {**dict.fromkeys(_NUMBERS, 0.0), **_first_values(knobs)}
+        self._first = {**dict.fromkeys(_NUMBERS, 0.0), **_first_values(knobs)}
+        self._valid = dict(self._first)
         self._written: dict[int, float] = {}
         self._variables = dict.fromkeys(_VARIABLES, 0.0)
 
     def __getitem__(self, number: int) -> float:
         """Return the valid value of a parameter."""
         return self._valid[number]
+
+    @property
+    def unit(self) -> str:
+        """What positions are counted in, by P90."""
+        return UNITS[int(self[90])]
+
+    @property
+    def decimals(self) -> int:
+        """Of positions and distances: those of the knob, until P90 chooses another unit (UG p. 100)."""
+        if self.unit == self._knobs.unit:
+            return self._knobs.decimals
+        return POSITION_DECIMALS_INCH if self.unit == "inch" else POSITION_DECIMALS
 
     def value(self, kind: str, number: int) -> float:
         """
@@ -100,17 +128,23 @@ class Parameters:
         Raises:
             RefusedError: There is none, or it does not take that value.
         """
-        self.value(kind, number)
-        low, high = _LIMITS.get(number, (-_LARGEST, _LARGEST)) if kind == "P" else (-_LARGEST, _LARGEST)
-        rounded = round(value, stored_decimals(kind, number)) + 0.0
-        if not low <= rounded <= high:
-            raise RefusedError(NUMBER)
+        rounded = stored(kind, number, value)
         if kind == "V":
             self._variables[number] = rounded
         elif self._at_once or number in CONTROL_PARAMETERS:
             self._valid[number] = rounded
         else:
             self._written[number] = rounded
+
+    def put(self, number: int, value: float) -> None:
+        """
+        Let the drive itself set a parameter: it is valid at once, and what waited for VP is gone.
+
+        Raises:
+            RefusedError: It does not take that value.
+        """
+        self._valid[number] = stored("P", number, value)
+        self._written.pop(number, None)
 
     def make_valid(self) -> None:
         """Let everything written take effect, as VP does."""
@@ -120,6 +154,40 @@ class Parameters:
     def forget_written(self) -> None:
         """Lose what VP has not made valid, as without power."""
         self._written.clear()
+
+    # What is kept without power
+
+    @property
+    def changed(self) -> Mapping[int, float]:
+        """The valid parameters that are not as they were at the beginning."""
+        return {number: value for number, value in self._valid.items() if value != self._first[number]}
+
+    @property
+    def changed_variables(self) -> Mapping[int, float]:
+        """The variables that are not 0."""
+        return {number: value for number, value in self._variables.items() if value}
+
+    def replace(self, parameters: Mapping[int, float], variables: Mapping[int, float]) -> None:
+        """Hold what :func:`stored` has found good, and all else as at the beginning."""
+        self._valid = {**self._first, **parameters}
+        self._written.clear()
+        self._variables = {**dict.fromkeys(_VARIABLES, 0.0), **variables}
+
+
+def stored(kind: str, number: int, value: float) -> float:
+    """
+    Return *value* as parameter or variable *number* would hold it.
+
+    Raises:
+        RefusedError: There is none, or it does not take that value.
+    """
+    if number not in (_NUMBERS if kind == "P" else _VARIABLES):
+        raise RefusedError(SYNTAX)
+    low, high = _LIMITS.get(number, (-_LARGEST, _LARGEST)) if kind == "P" else (-_LARGEST, _LARGEST)
+    rounded = round(value, stored_decimals(kind, number)) + 0.0
+    if not low <= rounded <= high:
+        raise RefusedError(NUMBER)
+    return rounded
 
 
 def stored_decimals(kind: str, number: int) -> int:

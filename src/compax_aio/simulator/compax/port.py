@@ -1,4 +1,4 @@
-"""The drive's serial port: entry buffer, byte times, Xon and Xoff. It outlives every connection, as a real one does."""
+"""The drive's serial port: lines and frames, byte times, Xon and Xoff. It outlives every connection, as a real one."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from typing import Final
 
 from compax_aio.compax.facts.line import COMMAND_END, MAX_LINE_LENGTH, XOFF, XON
 
+from .binary import frame_length
 from .knobs import Knobs
 
-__all__ = ["ReceivedLine", "SerialPort"]
+__all__ = ["Received", "ReceivedFrame", "ReceivedLine", "SerialPort"]
 
 _CR: Final = COMMAND_END[0]
 _LF: Final = 0x0A
@@ -27,13 +28,37 @@ class ReceivedLine:
     text: str
     too_long: bool
 
+    @property
+    def raw(self) -> bytes:
+        """What an echo sends back."""
+        return self.text.encode("latin-1") + COMMAND_END
+
+
+@dataclass(frozen=True, slots=True)
+class ReceivedFrame:
+    """A binary command, all the bytes that its first byte has announced."""
+
+    raw: bytes
+    """Also what an echo sends back: no CR came, so none is sent."""
+
+
+Received = ReceivedLine | ReceivedFrame
+
 
 class SerialPort:
-    """Bytes from and to the host, with the time each takes."""
+    """
+    Bytes from and to the host, with the time each takes.
+
+    What a byte belongs to is settled when it arrives. With binary transfer on, one that announces a frame begins it if
+    the entry buffer is empty; behind half a line it is a character of that line, and spoils it. A frame that has begun
+    takes as many bytes as it has announced, whatever they are and whatever P20 says meanwhile: also CR, LF, Xon and
+    Xoff, and the line that was sent after a frame was cut. The manual says only that a frame has no end sign and must
+    be sent in full (UG p. 166); the rest is the likeliest reading.
+    """
 
     def __init__(self, knobs: Knobs) -> None:
         self._byte_time_s = _BITS_A_BYTE / knobs.baudrate if knobs.baudrate else 0.0
-        self._xonxoff = False
+        self._xonxoff = self._binary = False
         self._truncates = knobs.long_line == "truncate"
         self._one_line = knobs.ready_after_answer
         self.reset()
@@ -43,8 +68,10 @@ class SerialPort:
         """Forget everything, as without power; what has left has left."""
         self._entry = bytearray()
         self._too_long = False
+        self._frame_length = 0
         self._full = False
-        self._received: deque[int] = deque(maxlen=_MAX_WAITING)
+        self._received: deque[Received] = deque()
+        self._kept = 0
         self._arriving: deque[tuple[float, int]] = deque()
         self._input_free_at = 0.0
         self._waiting = bytearray()
@@ -64,22 +91,13 @@ class SerialPort:
             self._input_free_at = max(self._input_free_at, now) + self._byte_time_s
             self._arriving.append((self._input_free_at, byte))
 
-    def next_line(self) -> ReceivedLine | None:
-        """Take bytes into the entry buffer until CR completes a line; half a line stays there until its CR comes."""
-        while self._received:
-            byte = self._received.popleft()
-            if byte == _CR:
-                line = ReceivedLine(self._entry.decode("latin-1"), self._too_long and not self._truncates)
-                self._entry.clear()
-                self._too_long = False
-                return line
-            if byte == _LF:
-                continue
-            if len(self._entry) < MAX_LINE_LENGTH:
-                self._entry.append(byte)
-            else:
-                self._too_long = True
-        return None
+    def next_received(self) -> Received | None:
+        """Return the oldest line or frame that has arrived whole; half of one stays until the rest comes."""
+        if not self._received:
+            return None
+        received = self._received.popleft()
+        self._kept -= len(received.raw)
+        return received
 
     def set_xonxoff(self, on: bool, now: float) -> None:
         """Heed Xon and Xoff from now on, or no more; output that Xoff holds then goes."""
@@ -88,17 +106,44 @@ class SerialPort:
             self._held = False
             self._depart(now)
 
+    def set_binary(self, on: bool) -> None:
+        """Let lines that begin from now on be frames too, or no more."""
+        self._binary = on
+
     def make_room(self) -> None:
         """Receive again, after a line has been answered; matters only to a drive that takes one line at a time."""
         self._full = False
 
     def _arrived(self, byte: int, now: float) -> None:
-        if self._xonxoff and byte in {XON, XOFF}:
+        if self._xonxoff and byte in {XON, XOFF} and not self._frame_length:
             self._held = byte == XOFF
             self._depart(now)
-        elif not self._full:
-            self._received.append(byte)
-            self._full = self._one_line and byte == _CR
+        elif not self._full and self._kept < _MAX_WAITING:
+            self._enter(byte)
+
+    def _enter(self, byte: int) -> None:
+        """Put a byte into the entry buffer; CR completes a line, the last byte that was announced a frame."""
+        if self._binary and not self._entry:
+            self._frame_length = frame_length(byte)
+        if self._frame_length:
+            self._entry.append(byte)
+            if len(self._entry) == self._frame_length:
+                self._complete(ReceivedFrame(bytes(self._entry)))
+        elif byte == _CR:
+            too_long = self._too_long and not self._truncates
+            self._complete(ReceivedLine(self._entry.decode("latin-1"), too_long))
+        elif len(self._entry) >= MAX_LINE_LENGTH:
+            self._too_long |= byte != _LF
+        elif byte != _LF:
+            self._entry.append(byte)
+
+    def _complete(self, received: Received) -> None:
+        self._received.append(received)
+        self._kept += len(received.raw)
+        self._entry.clear()
+        self._too_long = False
+        self._frame_length = 0
+        self._full = self._one_line
 
     # To the host
 

@@ -46,6 +46,10 @@ class Preparation:
             raise RefusedError(POINTS_FULL)
         self._points.append(point)
 
+    def cancel_points(self) -> None:
+        """Forget what was prepared for the next positioning."""
+        self._points.clear()
+
     def move(self, word: str, origin: float, target: float, reports: bool) -> Move:
         """Make a positioning of all that is in force, and use up the points."""
         homing = word == "POSA HOME"
@@ -76,7 +80,9 @@ class Preparation:
         comparators: list[Comparator] = []
         for place, point in enumerate(self._points, 1):
             if isinstance(point, say.PreparedSpeed):
-                steps.append(SpeedStep(point.distance, self._knobs.nominal_speed * point.percent / 100))
+                nominal = self._knobs.nominal_speed
+                own_ramp = None if point.time_ms is None else ramp(nominal, point.time_ms)
+                steps.append(SpeedStep(point.distance, nominal * point.percent / 100, own_ramp))
             else:
                 number = place if self._knobs.comparator_numbering == "points" else len(comparators) + 1
                 comparators.append(Comparator(number, point.distance, point.output, point.value))

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from typing import Final
 
 from compax_aio.compax.facts.commands import COMMANDS
-from compax_aio.compax.facts.limits import MAX_ACCELERATION_TIME_MS
+from compax_aio.compax.facts.limits import MAX_POSITION, POSITION_DECIMALS_INCH
 from compax_aio.compax.facts.line import MAX_LINE_LENGTH
 
 from . import instructions as say
-from .language import OPERAND, Context, instruction, number, operand
+from .language import MAX_COUNT, OPERAND, Context, instruction, number, operand
 from .refusals import NO_RECORD, NUMBER, SYNTAX, RefusedError
 
-__all__ = ["INPUT_NUMBERS", "RECORDS", "Memory", "Step", "read_record"]
+__all__ = ["INPUT_NUMBERS", "RECORDS", "Memory", "SpeedThenWait", "Step", "check_record", "read_record"]
 
 RECORDS: Final = range(1, 251)
 """N001-N250 (UG p. 95)."""
@@ -23,11 +23,16 @@ RECORDS: Final = range(1, 251)
 INPUT_NUMBERS: Final = range(1, 17)
 """I1-I16 (UG p. 140)."""
 
-_MAX_PASSES: Final = 65_000
-"""Of REPEAT; unknown, a placeholder."""
-
 _EMPTY: Final = "END"
 """What a record holds that was never written; unknown, a choice: a program that runs into it ends."""
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedThenWait:
+    """SPEED v WAIT t."""
+
+    speed: say.Speed
+    time_ms: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,6 +117,9 @@ Step = (
     | say.Outputs
     | say.Power
     | say.Assign
+    | say.Password
+    | say.NotSimulated
+    | SpeedThenWait
     | Wait
     | WaitStart
     | Jump
@@ -139,6 +147,10 @@ class Memory:
     def __getitem__(self, record: int) -> str:
         """Return the text of a record."""
         return self._records.get(record, _EMPTY)
+
+    def replace(self, records: Mapping[int, str]) -> None:
+        """Forget what was written, and hold *records* instead, which :func:`check_record` has found good."""
+        self._records = {record: text for record, text in records.items() if text != _EMPTY}
 
     def shown(self, record: int) -> str:
         """
@@ -185,6 +197,20 @@ class Memory:
         raise RefusedError(NO_RECORD)
 
 
+def check_record(record: int, text: str) -> str:
+    """
+    Read a record that some drive, of whatever unit, has had in its memory; return it as a listing has it.
+
+    Raises:
+        RefusedError: There is no such record, or no such instruction.
+    """
+    if record not in RECORDS:
+        raise RefusedError(NO_RECORD)
+    bare = text.replace(" ", "")
+    read_record(bare, Context(POSITION_DECIMALS_INCH, None))
+    return _in_long_form(bare)
+
+
 def read_record(text: str, context: Context) -> Step:
     """
     Read the text of a record, in upper case; blanks mean nothing.
@@ -193,6 +219,10 @@ def read_record(text: str, context: Context) -> Step:
         RefusedError: It is no instruction for a program.
     """
     text = text.replace(" ", "")
+    if found := _SPEED_THEN_WAIT.fullmatch(text):
+        speed = instruction(found["speed"], context)
+        assert isinstance(speed, say.Speed)
+        return SpeedThenWait(speed, _time_ms(found["time"], context))
     for word, reader in _READERS.items():
         if text.startswith(word):
             return reader(text[len(word) :], context)
@@ -205,11 +235,23 @@ def read_record(text: str, context: Context) -> Step:
 def _wait(text: str, context: Context) -> Step:
     if text == "START":
         return WaitStart()
-    return Wait(number(text, context, 0, 0, MAX_ACCELERATION_TIME_MS))
+    if text[:4] in {"POSA", "POSR"}:
+        number(text[4:], context, context.decimals, -MAX_POSITION, MAX_POSITION)
+        return say.NotSimulated(f"WAIT {text[:4]}")  # cut to length, XX50 only (IBS p. 39, 40)
+    return Wait(_time_ms(text, context))
+
+
+def _time_ms(text: str, context: Context) -> float:
+    return number(text, context, 0, 0, MAX_COUNT)
+
+
+def _goto(text: str, context: Context) -> Step:
+    step = instruction(f"GOTO{text}", context)
+    return step if isinstance(step, say.Password) else _jump(False, text)
 
 
 def _repeat(text: str, context: Context) -> Step:
-    return Repeat(int(number(text, context, 0, 1, _MAX_PASSES)))
+    return Repeat(int(number(text, context, 0, 1, MAX_COUNT)))
 
 
 def _jump(calls: bool, text: str) -> Jump:
@@ -243,6 +285,9 @@ def _if(text: str, _: Context) -> Step:
     return IfInputs(first, tuple(value == "1" for value in values), jump)
 
 
+_SPEED_THEN_WAIT: Final = re.compile(r"(?P<speed>(?:SPEED|SD)(?:[0-9.+]+|\.[PV][0-9]+))WAIT(?P<time>.+)")
+"""CAN p. 59, 61."""
+
 _CONDITION: Final = re.compile(
     rf"(?:(?P<event>ERROR|STOP)|I(?P<input>[0-9]{{1,2}})=(?P<values>[01]{{1,8}})"
     rf"|(?P<left>{OPERAND})(?P<sign><=|>=|<>|=|<|>)(?P<right>{OPERAND}))(?P<how>GOTO|GOSUB)(?P<where>[0-9A-Z]+)"
@@ -254,16 +299,18 @@ _READERS: Final[Mapping[str, Callable[[str, Context], Step]]] = {
     "REPEAT": _repeat,
     "RETURN": lambda text, _: _only(text, Return()),
     "GOSUB": lambda text, _: _jump(True, text),
-    "GOTO": lambda text, _: _jump(False, text),
+    "GOTO": _goto,
     "END": lambda text, _: _only(text, End()),
 }
 """How the rest of a record is read after the words that only programs know (CAN p. 59, 61; IBS p. 56)."""
 
 _LONG: Final = {form.replace(" ", ""): row.long for row in COMMANDS for form in (row.long, row.short)}
-_SPACED: Final = re.compile("SPEED|OUTPUT|(?<!^)(?:SD|OT)|GOTO|GOSUB")
+_SPACED: Final = re.compile("SPEED|OUTPUT|ACCEL|(?<!^)(?:SD|OT|AL)|GOTO|GOSUB|(?<!^)WAIT|^POS[AR]")
 _SPOKEN: Final = re.compile(
     "|".join(
-        sorted((*_LONG, "PAHOME", "WAIT", "REPEAT", "RETURN", "GOSUB", "GOTO", "IF", "END"), key=len, reverse=True)
+        sorted(
+            (*_LONG, "PAHOME", "WAIT", "REPEAT", "RETURN", "GOSUB", "GOTO", "IF", "END", "LOOP"), key=len, reverse=True
+        )
     )
 )
 
@@ -275,4 +322,4 @@ def _in_long_form(bare: str) -> str:
         return bare
     word = "POSA HOME" if found[0] == "PAHOME" else _LONG.get(found[0], found[0])
     rest = _SPACED.sub(lambda inner: f" {_LONG.get(inner[0], inner[0])} ", bare[found.end() :])
-    return f"{word} {rest}".strip()
+    return f"{word} {rest.strip()}".strip()

@@ -90,7 +90,7 @@ def _s16(machine: Machine, now: float) -> Mapping[str, bool]:
         "no_warning": machine.faults.warning is None,
         "machine_zero_approached": machine.homed,
         "ready_for_start": machine.is_ready_for_start(now),
-        "position_reached": machine.position_reached,
+        "position_reached": machine.positioning.reached,
         "idle_after_stop": machine.idle_after_stop,
         "output_0_is_1": machine.power_mode == 1,
         "output_0_is_2": machine.power_mode == 2,
@@ -116,6 +116,11 @@ def _s30(machine: Machine, _: float) -> str:
     return f"{code} 0" if machine.knobs.fault_numbers == "two" else f"{code}"
 
 
+def _placeholder(text: str) -> _Reader:
+    """Write something that only has its place: that there is such a value is known, its form is not."""
+    return lambda *_: text
+
+
 _UNITS: Final = {row.number: row.unit for row in STATUS_VALUES}
 
 _STATUS: Final[Mapping[int, _Reader]] = {
@@ -123,7 +128,10 @@ _STATUS: Final[Mapping[int, _Reader]] = {
     16: _bits(S16_BITS, _s16),
     17: _bits(S17_BITS, _s17),
     18: _s18,
+    **dict.fromkeys(range(23, 27), _placeholder("0")),
     30: _s30,
+    **{number: _placeholder(f"SIMULATOR {number - 30}") for number in range(31, 40)},
 }
+"""S23-S26, diagnosis, and S31-S39, identification, are four and nine values (IBS p. 12): placeholders."""
 
 _PARAMETER_UNITS: Final = {1: "axis", 2: "%", 6: "ms", 10: "ms", 11: "axis", 12: "axis", 14: "axis"}

@@ -11,6 +11,8 @@ __all__ = [
     "FAULTED",
     "MOVE_ACTIVE",
     "NESTING",
+    "NOT_MOVING",
+    "NOT_SIMULATED",
     "NO_RECORD",
     "NUMBER",
     "PASSWORD",
@@ -36,6 +38,8 @@ class Refusal:
     certainty: Certainty = Certainty.PLACEHOLDER
 
 
+NOT_SIMULATED: Final = Refusal(84, "not simulated")
+NOT_MOVING: Final = Refusal(85, "no move under way")
 PROGRAM_RUNS: Final = Refusal(86, "program running")
 NESTING: Final = Refusal(87, "wrong nesting")
 NO_RECORD: Final = Refusal(88, "no such record")
@@ -50,6 +54,8 @@ STORE_EMPTY: Final = Refusal(96, "nothing stored")
 POWER_OFF: Final = Refusal(97, "power stage off")
 
 REFUSALS: Final = (
+    NOT_SIMULATED,
+    NOT_MOVING,
     PROGRAM_RUNS,
     NESTING,
     NO_RECORD,
