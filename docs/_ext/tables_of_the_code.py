@@ -16,9 +16,16 @@ from docutils.parsers.rst import Directive
 from sphinx.application import Sphinx
 
 from compax_aio import errors
-from compax_aio.compax.facts.device_errors import DEVICE_ERRORS
+from compax_aio.compax.facts.certainty import Certainty
+from compax_aio.compax.facts.control_functions import CONTROL_FUNCTIONS
+from compax_aio.compax.facts.device_errors import DEVICE_ERRORS, ERROR_RANGES
+from compax_aio.compax.facts.parameters import PARAMETERS
+from compax_aio.compax.facts.quantities import QUANTITIES
+from compax_aio.compax.facts.serial_interface import INTERFACE_BITS
+from compax_aio.compax.facts.settings import DIALECT_FACTS, SETTING_FACTS
+from compax_aio.compax.facts.status import S16_BITS, S17_BITS, STATUS_VALUES
 from compax_aio.compax.protocol import TRANSITIONS, State
-from compax_aio.compax.settings import DriveSettings
+from compax_aio.compax.settings import Dialect, DriveSettings
 from compax_aio.simulator.compax import Knobs
 
 __all__ = ["setup"]
@@ -82,8 +89,86 @@ def _errors() -> Table:
 
 
 def _device_errors() -> Table:
-    rows = [(f"E{row.code}", row.meaning, row.remedy, f"UG p. {row.page}") for row in DEVICE_ERRORS]
-    return ("code", "meaning", "remedy", "source"), rows
+    rows = [
+        (f"E{row.code}", row.meaning, row.cause or "not on a page at hand", row.remedy, f"UG p. {row.page}")
+        for row in DEVICE_ERRORS
+    ]
+    return ("code", "meaning", "cause", "remedy", "source"), rows
+
+
+def _error_ranges() -> Table:
+    rows = [
+        (_range(row.codes), row.meaning, row.effect, row.remedy, _founded(row.certainty), row.source)
+        for row in ERROR_RANGES
+    ]
+    return ("codes", "what they are", "effect", "remedy", "founded", "source"), rows
+
+
+def _range(codes: range) -> str:
+    return f"E{codes[0]} to E{codes[-1]}" if len(codes) > 1 else f"{codes[0]}"
+
+
+# Facts
+
+
+def _founded(certainty: Certainty | None) -> str:
+    return certainty.name.lower() if certainty else "chosen here"
+
+
+def _status_values() -> Table:
+    rows = [
+        (f"S{row.number}", row.meaning, row.unit or "", row.form.value, _founded(row.certainty), row.source)
+        for row in STATUS_VALUES
+    ]
+    return ("status", "meaning", "unit", "form", "founded", "source"), rows
+
+
+def _status_bits() -> Table:
+    rows = [
+        (f"{status} bit {row.bit}", _code(row.name), row.meaning_when_set, _founded(row.certainty), row.source)
+        for status, bits in (("S16", S16_BITS), ("S17", S17_BITS))
+        for row in bits
+    ]
+    return ("bit", "name", "meaning when 1", "founded", "source"), rows
+
+
+def _quantities() -> Table:
+    rows = [(str(row.number), row.meaning, row.unit or "", _founded(row.certainty), row.source) for row in QUANTITIES]
+    return ("number", "quantity", "unit", "founded", "source"), rows
+
+
+def _interface_bits() -> Table:
+    rows = [
+        (
+            str(row.weight),
+            _code(row.name) if row.name else "",
+            row.meaning_when_set,
+            _founded(row.certainty),
+            row.source,
+        )
+        for row in INTERFACE_BITS
+    ]
+    return ("weight", "name", "meaning when set", "founded", "source"), rows
+
+
+def _parameters() -> Table:
+    rows = [(f"P{row.number}", row.meaning, row.unit or "", _founded(row.certainty), row.source) for row in PARAMETERS]
+    return ("parameter", "meaning", "unit", "founded", "source"), rows
+
+
+def _control_functions() -> Table:
+    rows = [
+        (
+            str(row.number),
+            row.meaning,
+            _code(row.word) if row.word else "",
+            _founded(row.certainty),
+            row.source,
+            _code(row.member) if row.member else "",
+        )
+        for row in CONTROL_FUNCTIONS
+    ]
+    return ("no.", "function", "word on RS-232", "word founded", "source", "sent by"), rows
 
 
 # States
@@ -108,15 +193,34 @@ def _transitions() -> Table:
 def _settings() -> Table:
     told = inspect.getdoc(DriveSettings) or ""
     meanings = dict(_attributes(told))
-    rows = [(_code(name), _shown(default), meanings[name]) for name, default in _defaults(DriveSettings)]
-    return ("setting", "default", "meaning"), rows
+    facts = {row.name: row for row in SETTING_FACTS}
+    rows = [
+        (_code(name), _shown(default), _founded(facts[name].certainty), facts[name].source, meanings[name])
+        for name, default in _defaults(DriveSettings)
+    ]
+    return ("setting", "default", "founded", "source", "meaning"), rows
+
+
+def _dialect() -> Table:
+    facts = {row.name: row for row in DIALECT_FACTS}
+    rows = [
+        (
+            _code(name),
+            "not set" if default is None else _code(default),
+            _founded(facts[name].certainty),
+            facts[name].source,
+            facts[name].meaning,
+        )
+        for name, default in _defaults(Dialect)
+    ]
+    return ("word", "default", "founded", "source", "what it does"), rows
 
 
 def _attributes(docstring: str) -> Iterator[tuple[str, str]]:
     """Read the section "Attributes:" of a docstring."""
     section = textwrap.dedent(docstring.partition("Attributes:\n")[2])
-    for line in section.splitlines():
-        name, _, meaning = line.partition(": ")
+    for entry in re.split(r"\n(?=\S)", section.rstrip()):
+        name, _, meaning = entry.partition(": ")
         yield name, _plain(meaning.replace("…", ""))
 
 
@@ -163,6 +267,8 @@ def _shown(value: Any) -> str:
         return str(int(value))
     if isinstance(value, float):
         return f"{value:,.10g}"
+    if value is None or value == {}:
+        return "not set"
     return getattr(value, "name", None) or (str(value) if isinstance(value, str | int) else f"{type(value).__name__}()")
 
 
@@ -186,6 +292,14 @@ def setup(app: Sphinx) -> dict[str, bool]:
     tables: Iterable[tuple[str, Callable[[], Table]]] = (
         ("table-of-errors", _errors),
         ("table-of-device-errors", _device_errors),
+        ("table-of-error-ranges", _error_ranges),
+        ("table-of-status-values", _status_values),
+        ("table-of-status-bits", _status_bits),
+        ("table-of-quantities", _quantities),
+        ("table-of-interface-bits", _interface_bits),
+        ("table-of-parameters", _parameters),
+        ("table-of-control-functions", _control_functions),
+        ("table-of-dialect", _dialect),
         ("table-of-states", _states),
         ("table-of-transitions", _transitions),
         ("table-of-settings", _settings),

@@ -1,12 +1,13 @@
 """Move servo axes over a serial line or TCP and await the position reached."""
 
+from .compax.axis import Axis
 from .compax.codecs import DriveStatus
 from .compax.connecting import connect
 from .compax.drive import Drive
 from .compax.group import DriveGroup, GroupMove
-from .compax.moves import Move, MoveResult
+from .compax.moves import Move, MoveResult, PreparedMove
 from .compax.protocol import MessageForm
-from .compax.settings import Dialect, DriveSettings
+from .compax.settings import AxisUnit, Dialect, DriveSettings
 from .compax.vocabulary import Comparator, SpeedStep
 from .errors import (
     AnswerTimeoutError,
@@ -28,6 +29,8 @@ from .errors import (
 
 __all__ = [
     "AnswerTimeoutError",
+    "Axis",
+    "AxisUnit",
     "CommandRejectedError",
     "Comparator",
     "CompaxError",
@@ -49,6 +52,7 @@ __all__ = [
     "MoveResult",
     "MoveStoppedError",
     "MoveTimeoutError",
+    "PreparedMove",
     "RestoreIncompleteError",
     "SpeedStep",
     "TransportError",

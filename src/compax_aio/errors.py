@@ -11,7 +11,7 @@ Every exception of compax_aio, one tree.
     ├── InvalidCommandError             refused here, before a byte was sent (also a ValueError)
     │   └── MoveActiveError             a move is running on that drive (also a MoveError)
     ├── UnexpectedAnswerError           the device answered something that is no answer to what was sent
-    ├── RestoreIncompleteError          a restore stopped half way; says what was applied and what was not
+    ├── RestoreIncompleteError          a restore stopped half way; says what was applied, what not, what is uncertain
     ├── LinkProtocolError               a protocol was used out of turn: a defect in the caller's code
     └── MoveError                       a move did not end at its target
         ├── MoveStoppedError            it was stopped on the way
@@ -119,21 +119,24 @@ class RestoreIncompleteError(CompaxError):
     A restore stopped half way.
 
     Attributes:
-        applied: By number, what the drive had before and what it has now.
-        not_applied: Numbers that were not written, the one that was refused first; if its fate is unknown, read it.
+        applied: By number, what the drive had before and what it has now, read back.
+        not_applied: Numbers that the drive still has as before: it refused them, or was not told.
+        uncertain: By number, what the drive had before and what was sent; what it has now is not known.
     """
 
     def __init__(
         self,
         what: str,
         *,
-        applied: Mapping[int, tuple[float, float]] | None = None,
+        applied: Mapping[int, tuple[Any, Any]] | None = None,
         not_applied: tuple[int, ...] = (),
+        uncertain: Mapping[int, tuple[Any, Any]] | None = None,
         **more: Any,
     ) -> None:
         super().__init__(what, **more)
         self.applied = dict(applied or {})
         self.not_applied = not_applied
+        self.uncertain = dict(uncertain or {})
 
 
 class LinkProtocolError(CompaxError):

@@ -12,12 +12,16 @@ from hypothesis import strategies as st
 from compax_aio.compax.codecs import (
     DriveStatus,
     HistoryEntry,
+    SerialInterface,
     decode_error,
     decode_history,
+    decode_interface,
+    decode_monitor_value,
     decode_number,
     decode_status_value,
     value_text,
 )
+from compax_aio.compax.facts.certainty import Certainty
 from compax_aio.compax.facts.device_errors import DEVICE_ERRORS, FAULT_CODES, device_error
 from compax_aio.compax.facts.status import MARKERS, S16_BITS, S17_BITS, STATUS_VALUES, Form
 from compax_aio.errors import UnexpectedAnswerError
@@ -146,6 +150,94 @@ def test_bits_history_and_pairs_are_decoded_by_their_form() -> None:
 def test_a_status_that_no_page_explains_is_given_as_it_came(number: int) -> None:
     value = decode_status_value(number, f"S{number:03d}: 12 abc", "mm")
     assert (value.value, value.raw, value.unit, value.meaning) == ("12 abc", "12 abc", None, "unknown")
+    assert value.certainty is Certainty.UNKNOWN
+
+
+@pytest.mark.parametrize("number", [19, 23, 26, 31, 39, 40])
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("12", 12), ("-12", -12), ("+7", 7), ("0012", 12), ("12.5", 12.5), ("-.5", -0.5), ("5.", 5.0),
+        ("1 2", "1 2"), ("0x1F", "0x1F"), ("12 V", "12 V"), ("V2.07", "V2.07"), ("1e3", "1e3"), ("", ""), (".", "."),
+        ("-", "-"), ("1234567890123456", "1234567890123456"),
+    ],
+)  # fmt: skip
+def test_a_value_of_unknown_form_is_a_number_only_where_it_is_nothing_else(
+    number: int, text: str, value: float | str
+) -> None:
+    """Diagnosis and identification (IBS p. 12): their text on RS-232 is on no page at hand."""
+    read = decode_status_value(number, f"S{number:03d}: {text}", "mm")
+    assert (read.value, type(read.value), read.raw) == (value, type(value), text)
+
+
+# Chosen quantities ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("chosen", "meaning", "unit", "certainty"),
+    [
+        ("P233: 29", "effective load of the motor", "%", Certainty.DOCUMENTED),
+        ("P233: 27", "position of the external encoder", "mm", Certainty.DOCUMENTED),
+        ("P233: 17", "HEDA transmission errors", None, Certainty.DOCUMENTED),
+        ("P233: 1", "not on a page at hand", None, Certainty.UNKNOWN),
+        ("P233: 99", "not on a page at hand", None, Certainty.UNKNOWN),
+        ("P233: 0", "not on a page at hand", None, Certainty.UNKNOWN),
+    ],
+)
+def test_a_monitor_value_is_what_its_parameter_chooses(
+    chosen: str, meaning: str, unit: str | None, certainty: Certainty
+) -> None:
+    """UG p. 211."""
+    value = decode_monitor_value(13, chosen, "S013: 12.50", "mm")
+    assert (value.number, value.chosen, value.raw, value.value) == (13, int(chosen.split()[1]), "12.50", 12.5)
+    assert value.meaning.startswith(meaning)
+    assert (value.unit, value.certainty) == (unit, certainty)
+
+
+@pytest.mark.parametrize(
+    ("chosen", "answer"),
+    [("P233: 1.5", "S013: 1"), ("P233: ", "S013: 1"), ("P233: 29", "S013: ?"), ("P233: " + "9" * 400, "S013: 1")],
+)
+def test_a_monitor_value_is_not_guessed(chosen: str, answer: str) -> None:
+    with pytest.raises(UnexpectedAnswerError):
+        decode_monitor_value(13, chosen, answer, "mm")
+
+
+# The serial interface -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("answer", "is_set", "unknown"),
+    [
+        ("P020: 0", "", 0),
+        ("P020: 1", "xonxoff", 0),
+        ("P020: 2", "errors_suppressed", 0),
+        ("P020: 3", "xonxoff errors_suppressed", 0),
+        ("P020: 16", "binary", 0),
+        ("P020: 19", "xonxoff errors_suppressed binary", 0),
+        ("P020: 12", "", 12),
+        ("P020: 255.000", "xonxoff errors_suppressed binary", 236),
+    ],
+)
+def test_p20_says_how_the_serial_interface_behaves(answer: str, is_set: str, unknown: int) -> None:
+    """UG p. 166 for 3 and 19."""
+    interface = decode_interface(answer)
+    assert [name for name in ("xonxoff", "errors_suppressed", "binary") if getattr(interface, name)] == is_set.split()
+    assert (interface.raw, interface.unknown) == (int(float(answer.split()[1])), unknown)
+
+
+@pytest.mark.parametrize("answer", ["P020: 1.5", "P020: -1", "P020:", "P020: E92", "P020: " + "9" * 400])
+def test_a_p20_that_is_no_whole_number_is_not_read(answer: str) -> None:
+    with pytest.raises(UnexpectedAnswerError) as caught:
+        decode_interface(answer)
+    assert caught.value.received == answer
+
+
+@given(p20=st.integers(0, 2**16))
+def test_no_bit_of_p20_gets_lost(p20: int) -> None:
+    interface = SerialInterface.decode(p20)
+    assert interface.raw == p20
+    assert interface.unknown + interface.xonxoff + 2 * interface.errors_suppressed + 16 * interface.binary == p20
 
 
 def test_a_number_that_is_none_is_unexpected() -> None:
@@ -210,9 +302,12 @@ def test_no_error_code_stands_twice() -> None:
     assert 92 not in FAULT_CODES
 
 
-def test_no_status_stands_twice_and_all_of_the_sheet_are_there() -> None:
-    numbers = [fact.number for fact in STATUS_VALUES]
-    assert sorted(numbers) == [*range(1, 19), *range(23, 27), *range(30, 40)]
+def test_every_status_stands_once_those_of_unknown_meaning_too() -> None:
+    assert [fact.number for fact in STATUS_VALUES] == list(range(1, 40))
+    unknown = [fact.number for fact in STATUS_VALUES if fact.certainty is Certainty.UNKNOWN]
+    assert unknown == [19, 20, 21, 22, 27, 28, 29]
+    assert all((fact.meaning == "unknown") == (fact.certainty is Certainty.UNKNOWN) for fact in STATUS_VALUES)
+    assert all(bool(fact.source) == (fact.certainty is not Certainty.UNKNOWN) for fact in STATUS_VALUES)
 
 
 def test_every_bit_stands_once_and_has_a_field() -> None:

@@ -70,8 +70,9 @@ async def test_a_group_reaches_its_targets_and_gives_each_axis_its_result() -> N
         assert await t.group.positions() == {"x": 100, "y": -50, "z": 0}
         assert motions(t.z) == []
         assert move.moves["x"].done()
-        for far, motion in ((t.x, "PA100$"), (t.y, "PA-50$")):
-            assert lines(far)[lines(far).index(motion) - 1] == "SD50"
+        for far, motion in ((t.x, "PA100,"), (t.y, "PA-50,")):
+            at = lines(far).index(motion)
+            assert lines(far)[at - 1 : at + 2] == ["SD50", motion, "!"]
 
 
 async def test_a_group_finds_machine_zero_with_the_axes_named_or_all() -> None:
@@ -96,11 +97,11 @@ async def test_if_one_drive_refuses_nobody_moves_afterwards(culprit: str) -> Non
         drive_named(culprit).raise_fault(20)
         move = t.group.move_to(x=10_000, y=10_000, z=10_000)
         error = await ending(move)
-        assert isinstance(error, CommandRejectedError)
+        assert isinstance(error, DriveFaultError)
         assert error.device == culprit
-        assert not t.moving
+        assert [motions(far) for far in t.far] == [[], [], []]
         assert now() < 1
-        with pytest.raises(CommandRejectedError):
+        with pytest.raises(DriveFaultError):
             await move.accepted
         others = [axis for axis in "xyz" if axis != culprit]
         assert [note.split(":")[0] for note in error.__notes__] == others

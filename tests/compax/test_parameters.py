@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import asyncio
 import tomllib
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
 from pathlib import Path
 
 import pytest
+from tests.promises.bench import ScriptedDrive, scripted
 
 import compax_aio
 from compax_aio import (
+    AnswerTimeoutError,
     CommandRejectedError,
+    ConnectionLostError,
     Dialect,
     Drive,
     DriveSettings,
@@ -267,6 +271,180 @@ async def test_a_file_that_cannot_be_written_leaves_the_old_one(
         await drive.variables.save(path)
     assert path.read_text() == "old"
     assert files_in(tmp_path) == ["x.toml"]
+
+
+# Half way -------------------------------------------------------------------------------------------------------------
+
+
+class Memory:
+    """Makes a scripted drive keep what is written; *trouble* says what becomes of a line instead."""
+
+    def __init__(self, far: ScriptedDrive, values: dict[str, float]) -> None:
+        self.far = far
+        self.trouble: dict[str, Callable[[], None]] = {}
+        far.on_line = self._on_line
+        for name, value in values.items():
+            self.keep(name, value)
+
+    def keep(self, name: str, value: float) -> None:
+        self.far.answers[name] = f"P{int(name[1:]):03d}: {value:.3f}"
+
+    def _on_line(self, line: str) -> None:
+        name, _, value = line.partition("=")
+        if line in self.trouble:
+            self.trouble[line]()
+        elif value:
+            self.keep(name, float(value))
+
+
+@asynccontextmanager
+async def drive_with(**values: float) -> AsyncIterator[tuple[Drive, Memory]]:
+    async with scripted(settings=DriveSettings(answer_timeout_s=0.1)) as (drive, far):
+        yield drive, Memory(far, values)
+
+
+@pytest.fixture
+def saved(tmp_path: Path) -> Path:
+    """A file in which P10 and P40 to P42 are 4, 5, 6 and 7."""
+    path = tmp_path / "p.toml"
+    path.write_text('kind = "parameters"\n[parameters]\nP10 = 4\nP40 = 5\nP41 = 6\nP42 = 7\n')
+    return path
+
+
+async def incomplete(drive: Drive, path: Path) -> RestoreIncompleteError:
+    with pytest.raises(RestoreIncompleteError) as caught:
+        await drive.parameters.restore(path)
+    return caught.value
+
+
+async def test_a_value_that_reads_back_as_another_is_uncertain(saved: Path) -> None:
+    async with drive_with(P10=0, P40=0, P41=0, P42=0) as (drive, memory):
+        memory.trouble["P41=6.000"] = lambda: memory.keep("P41", 5.5)
+        error = await incomplete(drive, saved)
+    assert error.applied == {10: (0, 4), 40: (0, 5)}
+    assert error.uncertain == {41: (0, 6)}
+    assert error.not_applied == (42,)
+    assert isinstance(error.__cause__, UnexpectedAnswerError)
+    assert "it is uncertain whether P41=6.000 was restored: P41 was written as 6 and reads back as 5.5" in error.what
+    assert error.what.endswith("applied: P10, P40; not applied: P42; uncertain: P41")
+    assert "not in force before VP: P10" in str(error)
+    assert error.exchanges
+
+
+async def test_the_uncertain_value_is_rolled_back_first_and_the_others_in_reverse(saved: Path) -> None:
+    async with drive_with(P10=1, P40=2, P41=3, P42=0) as (drive, memory):
+        memory.trouble["P41=6.000"] = lambda: memory.keep("P41", 5.5)
+        error = await incomplete(drive, saved)
+        before = len(memory.far.lines)
+        await drive.parameters.roll_back(error)
+        written = [line for line in memory.far.lines[before:] if "=" in line]
+        assert written == ["P41=3.000", "P40=2.000", "P10=1"]
+        assert [await drive.parameters.read(number) for number in (10, 40, 41, 42)] == [1, 2, 3, 0]
+        await drive.parameters.roll_back(error)  # once more does no harm
+
+
+async def test_a_value_whose_acknowledgement_does_not_come_is_uncertain(saved: Path) -> None:
+    async with drive_with(P10=4, P40=0, P41=0, P42=0) as (drive, memory):
+        memory.far.answers["P40=5.000"] = None
+        error = await incomplete(drive, saved)
+        assert isinstance(error.__cause__, AnswerTimeoutError)
+        assert (error.applied, error.uncertain, error.not_applied) == ({}, {40: (0, 5)}, (41, 42))
+        assert memory.far.lines.count("P40=5.000") == 1
+        await drive.parameters.roll_back(error)
+        assert memory.far.lines[-2:] == ["P40=0.000", "P40"]
+
+
+async def test_a_value_on_a_line_that_is_lost_is_uncertain(saved: Path) -> None:
+    async with drive_with(P10=4, P40=0, P41=0, P42=0) as (drive, memory):
+        memory.trouble["P41=6.000"] = memory.far.transport.abort
+        error = await incomplete(drive, saved)
+    assert isinstance(error.__cause__, ConnectionLostError)
+    assert (error.applied, error.uncertain, error.not_applied) == ({40: (0, 5)}, {41: (0, 6)}, (42,))
+
+
+async def test_a_value_that_is_answered_with_something_else_is_uncertain(saved: Path) -> None:
+    async with drive_with(P10=4, P40=0, P41=0, P42=0) as (drive, memory):
+        memory.far.answers["P40=5.000"] = "WHAT"
+        error = await incomplete(drive, saved)
+    assert (error.uncertain, error.not_applied) == ({40: (0, 5)}, (41, 42))
+
+
+async def test_a_value_that_is_taken_and_then_not_given_is_uncertain_and_waits_for_vp(saved: Path) -> None:
+    async with drive_with(P10=0, P40=5, P41=6, P42=7) as (drive, memory):
+        memory.trouble["P10=4"] = lambda: memory.far.answers.update({"P10": "E90"})
+        error = await incomplete(drive, saved)
+        assert isinstance(error.__cause__, CommandRejectedError)
+        assert (error.applied, error.uncertain, error.not_applied) == ({}, {10: (0, 4)}, ())
+        assert drive.parameters.pending == (10,)
+
+
+async def test_a_value_that_is_refused_is_not_uncertain(saved: Path) -> None:
+    async with drive_with(P10=0, P40=5, P41=6, P42=0) as (drive, memory):
+        memory.far.answers["P10=4"] = "E89"
+        error = await incomplete(drive, saved)
+        assert (error.applied, error.uncertain, error.not_applied) == ({}, {}, (10, 42))
+        assert error.what.startswith("P10=4 was not restored: the drive rejected it with E89")
+        assert "uncertain" not in error.what
+        assert "VP" not in (error.hint or "")
+        assert drive.parameters.pending == ()
+
+
+async def test_nothing_is_written_if_the_drive_does_not_give_a_value_of_the_file(saved: Path) -> None:
+    async with drive_with(P10=0, P40=0, P42=0) as (drive, memory):
+        memory.far.answers["P41"] = "E90"
+        for dry_run in (True, False):
+            with pytest.raises(
+                RestoreIncompleteError, match="nothing was written: the drive does not give P41"
+            ) as caught:
+                await drive.parameters.restore(saved, dry_run=dry_run)
+            assert (caught.value.applied, caught.value.uncertain) == ({}, {})
+            assert caught.value.not_applied == (10, 40, 41, 42)
+        assert not [line for line in memory.far.lines if "=" in line]
+
+
+async def test_what_a_restore_leaves_for_vp_is_said(drive: Drive, tmp_path: Path) -> None:
+    path = tmp_path / "x.toml"
+    path.write_text('kind = "parameters"\n[parameters]\nP10 = 333\nP40 = 5\n')
+    async with drive.parameters.unlocked() as parameters:
+        would = await parameters.restore(path, dry_run=True)
+        assert (would.pending, parameters.pending) == ((10,), ())
+        done = await parameters.restore(path)
+        assert (done.pending, parameters.pending) == ((10,), (10,))
+        await parameters.make_valid()
+        assert (await parameters.restore(path)).pending == ()
+    await drive.variables.save(path)
+    await drive.variables.write(5, 5)
+    done = await drive.variables.restore(path)
+    assert (list(done.changed), done.pending) == ([5], ())
+
+
+# What is chosen by a parameter ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("status", "parameter"), [(13, 233), (14, 234), (15, 182)])
+async def test_a_status_whose_quantity_is_chosen_says_which_it_is(status: int, parameter: int) -> None:
+    """UG p. 211."""
+    async with scripted({f"P{parameter}": f"P{parameter}: 27", f"S{status}": f"S{status:03d}: 12.50"}) as (drive, far):
+        value = await drive.read_monitor(status)
+        assert far.lines[-2:] == [f"P{parameter}", f"S{status}"]
+    assert (value.number, value.chosen, value.value, value.unit) == (status, 27, 12.5, "units")
+    assert value.meaning == "position of the external encoder"
+
+
+@pytest.mark.parametrize("number", [12, 16, 233, 13.0, True, "13", [13]])
+async def test_no_other_status_has_a_quantity_to_choose(number: int) -> None:
+    async with scripted() as (drive, far):
+        before = list(far.lines)
+        with pytest.raises(InvalidCommandError, match="S13, S14 and S15"):
+            await drive.read_monitor(number)
+        assert far.lines == before
+
+
+async def test_a_chosen_quantity_that_cannot_be_read_is_told_with_its_drive() -> None:
+    async with scripted({"P233": "P233: 1.5", "S13": "S013: 12.50"}) as (drive, _):
+        with pytest.raises(UnexpectedAnswerError) as caught:
+            await drive.read_monitor(13)
+    assert (caught.value.device, caught.value.received) == ("x", "P233: 1.5")
 
 
 async def test_the_word_for_vp_is_part_of_the_dialect() -> None:

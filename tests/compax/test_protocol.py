@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 from tests.fakes.answers import PROMPT, answer_to
 
+from compax_aio.compax.binary import BinaryTransfer
 from compax_aio.compax.facts.status import MARKERS
 from compax_aio.compax.protocol import (
     TRANSITIONS,
@@ -26,6 +27,7 @@ from compax_aio.compax.protocol import (
     Stray,
     UnexpectedAnswer,
 )
+from compax_aio.compax.protocol_states import LineOpened
 from compax_aio.errors import LinkProtocolError
 from compax_aio.link.contract import Event, InStep, LateEnding, MarkerSpent, TurnOver
 
@@ -80,6 +82,23 @@ def stop_ahead(*, after: str | None = None) -> CompaxProtocol:
     return protocol
 
 
+def frame_outstanding() -> CompaxProtocol:
+    protocol = in_step()
+    protocol.encode = BinaryTransfer(motion=True).encode
+    protocol.send("PA100")
+    protocol.bytes_to_send()
+    return protocol
+
+
+def frame_in_doubt(*, stop_ahead: bool = False) -> CompaxProtocol:
+    protocol = frame_outstanding()
+    protocol.time_ran_out()
+    if stop_ahead:
+        protocol.send_ahead("STOP")
+        protocol.bytes_to_send()
+    return protocol
+
+
 SITUATIONS: Final[dict[str, Callable[[], CompaxProtocol]]] = {
     "in step": in_step,
     "query outstanding": lambda: waiting_for("S1"),
@@ -95,6 +114,9 @@ SITUATIONS: Final[dict[str, Callable[[], CompaxProtocol]]] = {
     "query in doubt, marker outstanding": lambda: marker_outstanding(after="S1"),
     "stop ahead": stop_ahead,
     "stop ahead of a doubtful command": lambda: stop_ahead(after="PA100$"),
+    "motion frame outstanding": frame_outstanding,
+    "motion frame in doubt": frame_in_doubt,
+    "stop ahead of a doubtful motion frame": lambda: frame_in_doubt(stop_ahead=True),
 }
 
 situations = pytest.mark.parametrize("situation", SITUATIONS.values(), ids=SITUATIONS.keys())
@@ -154,7 +176,8 @@ def test_markers_and_what_goes_ahead_are_only_for_a_free_line_in_doubt(
 ) -> None:
     for send in (CompaxProtocol.send_marker, lambda protocol: protocol.send_ahead("STOP")):
         protocol = situation()
-        if protocol.in_doubt and not protocol.is_busy:
+        may_be_sent = protocol.held is None or send is not CompaxProtocol.send_marker
+        if protocol.in_doubt and not protocol.is_busy and may_be_sent:
             send(protocol)
             assert protocol.is_busy
         else:
@@ -167,8 +190,9 @@ def test_markers_and_what_goes_ahead_are_only_for_a_free_line_in_doubt(
 def test_time_runs_out_only_for_something_outstanding(situation: Callable[[], CompaxProtocol]) -> None:
     protocol = situation()
     if protocol.is_busy:
+        may_be_cut = protocol.held is not None or protocol.state is State.AWAITING_FRAME
         protocol.time_ran_out()
-        assert protocol.state is State.IN_DOUBT
+        assert protocol.state is (State.FRAME_IN_DOUBT if may_be_cut else State.IN_DOUBT)
     else:
         with pytest.raises(LinkProtocolError):
             protocol.time_ran_out()
@@ -185,16 +209,17 @@ def test_misuse_names_the_line_that_is_outstanding() -> None:
 def test_a_line_that_is_opened_again_is_in_doubt(situation: Callable[[], CompaxProtocol]) -> None:
     protocol = situation()
     protocol.receive(b"half a li")
+    may_be_cut = protocol.held is not None or protocol.state is State.AWAITING_FRAME
     protocol.line_opened()
-    assert protocol.state is State.IN_DOUBT
+    assert protocol.state is (State.FRAME_IN_DOUBT if may_be_cut else State.IN_DOUBT)
+    protocol.resume()
     marker = ask_marker(protocol)
     assert InStep() in read(protocol, answer_to(marker))
 
 
 def test_every_state_knows_messages_noise_and_a_new_line() -> None:
     """The three things that can happen at any time."""
-    opened = next(event for _, event in TRANSITIONS if event.__name__ == "_LineOpened")
-    for state, event in itertools.product(State, (PositionReached, ComparatorReached, Stray, opened)):
+    for state, event in itertools.product(State, (PositionReached, ComparatorReached, Stray, LineOpened)):
         assert (state, event) in TRANSITIONS
 
 
@@ -655,6 +680,7 @@ FRAGMENTS: Final = [
     *(PROMPT, b"\r", b"\n", b">", b"$", b" ", b"\0", b"\x11", b"\x13", b"\xff", b"\xb2", b"\xa0", b"\x85"),
     *(b"1", b"2", b"8", b"9", b"0", b":", b"=", b"-", b".", b"E92", b"E90 x", b"E", b"hello"),
     *(b"S001: 5", b"S1", b"S", b"S017: 00000000", b"S016", b"S17 1", b"P40=1", b"N5", b"SD50", b"PA100$", b"STOP"),
+    *(b"! 0005", b"!", b"\x88A", BinaryTransfer(motion=True).encode("PA100")),
 ]
 streams = st.lists(st.sampled_from(FRAGMENTS), max_size=18).map(b"".join)
 
@@ -706,6 +732,7 @@ def test_no_bytes_whatever_are_an_error_of_the_reader(
     if protocol.is_busy:
         protocol.time_ran_out()
     protocol.receive(PROMPT)
+    protocol.resume()
     if protocol.in_doubt:
         assert InStep() in read(protocol, answer_to(ask_marker(protocol)))
 
@@ -715,7 +742,7 @@ def test_no_bytes_whatever_are_an_error_of_the_reader(
 @given(stream=streams)
 def test_one_turn_ends_at_most_once(situation: Callable[[], CompaxProtocol], stream: bytes) -> None:
     protocol = situation()
-    was_awaiting = protocol.state is State.AWAITING_ANSWER
+    was_awaiting = protocol.state in (State.AWAITING_ANSWER, State.AWAITING_FRAME)
     ended = [event for event in read(protocol, stream) if isinstance(event, TurnOver)]
     assert len(ended) <= was_awaiting
 
@@ -731,13 +758,14 @@ class LineModel(RuleBasedStateMachine):
     A drive that does everything right and in order, behind wires that delay and lose.
 
     Every line sent has a serial number of its own, and the drive puts it into its answer: so an answer that is
-    credited to another line is seen at once (P4). Lines and answers are lost whole, or a line loses its end sign and
-    stays in the drive's buffer until the next one completes it.
+    credited to another line is seen at once (P4). Lines and answers are lost whole, or a line loses its end and stays
+    in the drive's buffer until the next one completes it: a line in text to one that is refused, a frame to one that
+    says something else and is accepted.
     """
 
     def __init__(self) -> None:
         super().__init__()
-        self.protocol = CompaxProtocol(MessageForm.PROMPT_FIRST)
+        self.protocol = CompaxProtocol(MessageForm.PROMPT_FIRST, BinaryTransfer().encode)
         self.protocol.line_opened()
         self.serial = 0
         self.sent: dict[int, str] = {}
@@ -751,20 +779,19 @@ class LineModel(RuleBasedStateMachine):
         self.accepted: set[int] = set()
         self.refused: set[int] = set()
 
-    def _take_sent(self) -> int:
+    def _take_sent(self, line: str | None = None) -> int:
         data = self.protocol.bytes_to_send()
-        assert data.endswith(b"\r")
-        assert data.count(b"\r") == 1, "one line at a time (P1)"
+        assert data[0] >= 0x80 or (data.endswith(b"\r") and data.count(b"\r") == 1), "one line at a time (P1)"
         self.serial += 1
-        self.sent[self.serial] = data[:-1].decode()
+        self.sent[self.serial] = line or data[:-1].decode()
         self.to_drive.append((self.serial, data))
         return self.serial
 
     @precondition(lambda self: self.protocol.state is State.READY)
-    @rule(line=st.sampled_from(["S1", "S2", "S16", "S17", "P40", "SD50", "AL250", "PA100$"]))
+    @rule(line=st.sampled_from(["S1", "S2", "S16", "S17", "P40", "SD50", "SD17", "AL250", "PA100$"]))
     def send(self, line: str) -> None:
         self.protocol.send(line)
-        self.asked = self._take_sent()
+        self.asked = self._take_sent(line)
 
     @precondition(lambda self: self.protocol.in_doubt and not self.protocol.is_busy)
     @rule()
@@ -784,20 +811,35 @@ class LineModel(RuleBasedStateMachine):
         self.protocol.time_ran_out()
 
     @precondition(lambda self: self.to_drive)
-    @rule(damage=st.sampled_from(["none", "none", "none", "none", "none", "all lost", "end sign lost"]))
-    def carry_a_line_to_the_drive(self, damage: str) -> None:
+    @rule(
+        damage=st.sampled_from(["none", "none", "none", "none", "none", "all lost", "end lost"]), cut=st.integers(1, 7)
+    )
+    def carry_a_line_to_the_drive(self, damage: str, cut: int) -> None:
         serial, data = self.to_drive.pop(0)
         if damage == "all lost":
             return
-        if damage == "end sign lost":
-            self.drive_buffer += data[:-1]
-            return
-        line, self.drive_buffer = (self.drive_buffer + data)[:-1].decode(), b""
-        if line != self.sent[serial]:
+        if damage == "end lost":
+            data = data[: -min(cut, len(data) - 1)] if data[0] >= 0x80 else data[:-1]
+        for byte in data:
+            self.drive_buffer += bytes([byte])
+            if self._is_whole(self.drive_buffer):
+                command, self.drive_buffer = self.drive_buffer, b""
+                self._execute(serial, command, is_as_sent=command == data)
+
+    @staticmethod
+    def _is_whole(buffer: bytes) -> bool:
+        return len(buffer) == buffer[0] - 0x80 if buffer[0] >= 0x80 else buffer.endswith(b"\r")
+
+    def _execute(self, serial: int, command: bytes, *, is_as_sent: bool) -> None:
+        if command[0] >= 0x80:
+            if is_as_sent:
+                self.accepted.add(serial)
+            self.to_host.append(PROMPT)
+        elif not is_as_sent:
             self.refused.add(serial)
             self.to_host.append(b"E90" + PROMPT)
-        elif line[0] in "SP" and line[1:].isdigit():
-            self.to_host.append(answer_to(line, serial))
+        elif command[:1] in (b"S", b"P") and command[1:-1].isdigit():
+            self.to_host.append(answer_to(command[:-1].decode(), serial))
         else:
             self.accepted.add(serial)
             self.to_host.append(PROMPT)
@@ -852,6 +894,7 @@ class LineModel(RuleBasedStateMachine):
     def nothing_is_on_its_way_when_the_line_is_in_step(self) -> None:
         if self.protocol.state is State.READY:
             assert not self.to_drive
+            assert not self.drive_buffer
             assert len(self.to_host) == self.messages
 
 

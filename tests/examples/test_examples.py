@@ -186,6 +186,67 @@ def test_the_gripper_is_switched_on_the_way(
     assert drive.log.texts(LogKind.OUTPUT) == ["O9=1", "O10=1", "O9=0", "O10=0"]
 
 
+# A program of the drive
+
+
+def test_a_program_is_downloaded_run_and_watched(
+    virtual_clock: Callable[[str], SimulatedDrive], capsys: pytest.CaptureFixture[str]
+) -> None:
+    drive = virtual_clock("one")
+    assert load("run_program").main(["sim://compax?name=one"]) == 0
+    told = lines_of(capsys)
+    assert told[0] == "8 records written, 2 were there"
+    assert told[-1] == "the program has ended at 0.00 units"
+    assert len(told) > 8, "it was not watched on its way"
+    assert drive.log.texts(LogKind.OUTPUT) == ["O9=1", "O9=0"] * 2
+
+
+@pytest.mark.parametrize(("text", "says"), [("N001: POSA 5\nN002: GOTO 9\n", "no N009"), (None, "FileNotFoundError: ")])
+def test_a_listing_that_cannot_be_run_is_told_and_nothing_moves(
+    virtual_clock: Callable[[str], SimulatedDrive],
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    text: str | None,
+    says: str,
+) -> None:
+    drive = virtual_clock("one")
+    path = tmp_path / "listing.txt"
+    if text is not None:
+        path.write_text(text)
+    assert load("run_program").main(["sim://compax?name=one", "--listing", str(path)]) == 1
+    assert says in capsys.readouterr().err
+    assert drive.log.texts(LogKind.MOTION_STARTED, LogKind.PROGRAM) == []
+
+
+@pytest.mark.parametrize(
+    ("disturb", "status", "told"), [("fault", 1, "DriveFaultError: axis: a fault"), ("ctrl-c", 130, "was stopped")]
+)
+def test_a_program_that_is_disturbed_leaves_the_axis_standing(
+    virtual_clock: Callable[[str], SimulatedDrive],
+    capsys: pytest.CaptureFixture[str],
+    disturb: str,
+    status: int,
+    told: str,
+) -> None:
+    drive = virtual_clock("one")
+    example = load("run_program")
+    run = example.run
+
+    async def disturbed(*arguments: Any) -> None:
+        loop = asyncio.get_running_loop()
+        if disturb == "fault":
+            loop.call_later(1.0, drive.raise_fault, 55)
+        else:
+            loop.call_later(1.0, signal.raise_signal, signal.SIGINT)
+        await run(*arguments)
+
+    vars(example)["run"] = disturbed
+    assert example.main(["sim://compax?name=one"]) == status
+    assert told in capsys.readouterr().err
+    assert not drive.moving
+    assert not drive.log.texts(LogKind.PROGRAM)[-1].startswith(("started", "continued"))
+
+
 # The service
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from compax_aio.link.contract import Event, InStep, TurnOver
+from compax_aio.link.contract import Event, Hold, InStep, Stranger, TurnOver
 
 __all__ = ["Said", "ToyProtocol", "as_toy"]
 
@@ -27,6 +27,7 @@ class ToyProtocol:
     def __init__(self) -> None:
         self.in_doubt = True
         self.is_busy = False
+        self.held: Hold | None = None
         self._out = b""
         self._received = b""
         self._events: list[Event] = []
@@ -50,6 +51,12 @@ class ToyProtocol:
     def time_ran_out(self) -> None:
         assert self.is_busy
         self.in_doubt, self.is_busy = True, False
+
+    def resume(self) -> None:
+        self.held = None
+
+    def stranger(self, *, time_is_over: bool) -> Stranger | None:
+        return None
 
     def bytes_to_send(self) -> bytes:
         out, self._out = self._out, b""

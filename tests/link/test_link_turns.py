@@ -194,6 +194,138 @@ def test_whoever_is_cancelled_whenever_the_others_get_their_own_answers(
         runner.run(asyncio.wait_for(main(), 1000))
 
 
+# Held-back reads ------------------------------------------------------------------------------------------------------
+
+
+async def test_reads_that_are_held_back_wait_and_all_else_goes_on(line: Line) -> None:
+    line.link.hold_reads(5)
+    reads = [line.ask("S1"), line.ask("S1"), line.ask("S2")]
+    for lane in (Lane.STOP, Lane.CONTROL, Lane.MOTION):
+        await line.ask(f"SD{lane + 1}", lane)
+    await asyncio.sleep(4)
+    assert line.far.lines == ["SD1", "SD2", "SD3"]
+    assert not any(read.done() for read in reads)
+    line.link.release_reads()
+    assert [await read for read in reads] == [Answered("S001: 1"), Answered("S001: 1"), Answered("S002: 2")]
+    assert line.far.lines[3:] == ["S1", "S2"], "those that wait together still share"
+
+
+async def test_reads_are_held_back_no_longer_than_was_said(line: Line) -> None:
+    now = asyncio.get_running_loop().time
+    before = now()
+    line.link.hold_reads(2)
+    await line.answer("S1")
+    assert now() - before == pytest.approx(2.02)
+    line.link.hold_reads(2)
+    await asyncio.sleep(1)
+    line.link.hold_reads(2)
+    before = now()
+    await line.answer("S1")
+    assert now() - before == pytest.approx(2.02), "the last word counts"
+    await line.answer("S2")
+    assert now() - before == pytest.approx(2.04)
+
+
+async def test_releasing_reads_that_are_not_held_back_changes_nothing(line: Line) -> None:
+    line.link.release_reads()
+    line.link.hold_reads(5)
+    line.link.release_reads()
+    line.link.release_reads()
+    before = asyncio.get_running_loop().time()
+    await line.answer("S1")
+    assert asyncio.get_running_loop().time() - before < 0.1
+    await asyncio.sleep(10)
+
+
+async def test_reads_may_be_held_back_when_a_line_is_sent(line: Line) -> None:
+    """Nothing else goes out between a line that is stored and what executes it."""
+    stored = line.link.exchange("PA100,", Lane.MOTION, on_sent=lambda: line.link.hold_reads(5))
+    read = line.ask("S1")
+    await stored
+    sent = line.link.lines_sent
+    await asyncio.sleep(1)
+    assert line.link.lines_sent == sent
+    assert line.link.is_free
+    executed = line.ask("!", Lane.MOTION)
+    line.link.release_reads()
+    assert await executed == Acknowledged()
+    assert await read == Answered("S001: 1")
+    assert line.far.lines == ["PA100,", "!", "S1"]
+
+
+async def test_a_read_on_the_wire_is_not_held_back(line: Line) -> None:
+    read = line.ask("S1")
+    line.link.hold_reads(5)
+    assert await asyncio.wait_for(read, 0.1) == Answered("S001: 1")
+
+
+async def test_held_back_reads_end_with_their_line_and_with_a_silent_drive(line: Line) -> None:
+    line.link.hold_reads(1000)
+    read = line.ask("S1")
+    line.far.script = lambda text: None
+    line.ask("SD5", Lane.CONTROL)
+    with pytest.raises(AnswerTimeoutError):
+        await asyncio.wait_for(read, 10)
+    line.far.script = as_drive
+    read = line.ask("S1")
+    await asyncio.sleep(1)
+    await line.link.close()
+    with pytest.raises(ConnectionLostError):
+        await read
+    line.link.release_reads()
+
+
+# What has gone out ----------------------------------------------------------------------------------------------------
+
+
+async def test_every_line_that_goes_out_is_counted_markers_too(line: Line) -> None:
+    link = line.link
+    before = link.lines_sent
+    counted: list[int] = []
+    waiter = link.exchange("SD50", Lane.CONTROL, on_sent=lambda: counted.append(link.lines_sent - before))
+    assert counted == [1], "its own line is counted when it is told that it is sent"
+    await waiter
+    assert link.lines_sent == before + 1
+    line.far.say(b"noise" + PROMPT)
+    await asyncio.sleep(0.1)
+    assert link.lines_sent == before + 2, "a marker"
+
+
+async def test_a_line_is_free_when_what_is_queued_is_written_at_once(line: Line) -> None:
+    def is_free() -> bool:
+        return line.link.is_free
+
+    assert is_free()
+    waiter = line.ask("S1")
+    assert not is_free()
+    await waiter
+    assert is_free()
+    line.link.hold_reads(5)
+    line.ask("S2").cancel()
+    assert is_free(), "a read that is held back is in nobody's way"
+    line.far.script = lambda text: None
+    lost = line.ask("SD5", Lane.CONTROL)
+    await asyncio.gather(lost, return_exceptions=True)
+    assert not is_free(), "in doubt"
+    await asyncio.sleep(10)
+    assert not is_free(), "given up, and still in doubt"
+    await line.link.close()
+    assert not is_free()
+
+
+async def test_a_line_is_not_free_while_events_are_handled() -> None:
+    line = Line(ScriptedFarEnd())
+    seen: list[bool] = []
+    line.link._on_event = lambda _: seen.append(line.link.is_free)
+    line.connect()
+    await line.answer("S1")
+    line.far.say(b"$" + PROMPT)
+    await asyncio.sleep(0.01)
+    assert seen == [False]
+    assert line.link.is_free
+    await line.link.close()
+
+
 # Events ---------------------------------------------------------------------------------------------------------------
 
 
@@ -319,12 +451,12 @@ async def test_opening_a_silent_line_fails_in_bounded_time_and_closes_it() -> No
     assert line.far.is_lost
 
 
-async def test_opening_a_line_of_another_device_says_that_it_is_another() -> None:
+async def test_opening_a_line_of_an_unknown_device_says_that_it_is_another() -> None:
     name = unique_name()
-    line = Line(ScriptedFarEnd(lambda text: b"login:\r\n"))
+    line = Line(ScriptedFarEnd(lambda text: b"pardon?\r\n"))
     with await listen(name, lambda: line.far), pytest.raises(AnswerTimeoutError) as caught:
         await line.link.open(f"loop://{name}")
-    assert "login" in (caught.value.received or "")
+    assert "pardon" in (caught.value.received or "")
     assert "baud" in (caught.value.hint or "")
 
 

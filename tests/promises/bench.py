@@ -133,6 +133,7 @@ class ScriptedDrive(asyncio.Protocol):
             "S16": "S016: 11010000",
             "S17": "S017: 00000010",
             "S30": "S030: 0 0",
+            "P20": "P020: 0",
             **(answers or {}),
         }
         self.lines: list[str] = []

@@ -28,7 +28,7 @@ async def test_sixty_four_drives_move_at_once_over_tcp_and_every_move_is_confirm
             by_axis: dict[str, Any] = {f"a{number}": target for number, target in enumerate(targets)}
             results = await group.move_to(**by_axis)
             assert [results[f"a{number}"].target for number in range(DRIVES)] == targets
-            assert {result.confirmed_by for result in results.values()} == {"message"}
+            assert {result.confirmed_by for result in results.values()} == {"status"}
             assert [far.position for far in far_ends] == targets
             assert list((await group.positions()).values()) == targets
         assert all(len(motions(far)) == 2 for far in far_ends)

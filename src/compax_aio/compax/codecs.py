@@ -1,26 +1,34 @@
-"""Status answers into values: numbers, named bits, error history (UG p. 209)."""
+"""Answers into values: numbers, named bits, error history, chosen quantities, P20 (UG p. 166, 209, 211)."""
 
 from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from math import isfinite
 from typing import Final
 
 from ..errors import UnexpectedAnswerError
+from .facts.certainty import Certainty
 from .facts.device_errors import (
     HISTORY_ACKNOWLEDGED,
     HISTORY_POWERED_ON,
     DeviceError,
     device_error,
 )
+from .facts.quantities import SELECTORS, quantity
+from .facts.serial_interface import BINARY_BIT, ERRORS_SUPPRESSED_BIT, INTERFACE_BITS, XONXOFF_BIT
 from .facts.status import S16_BITS, S17_BITS, STATUS_VALUES, Form, StatusFact
 
 __all__ = [
     "DriveStatus",
     "HistoryEntry",
+    "MonitorValue",
+    "SerialInterface",
     "StatusValue",
     "decode_error",
     "decode_history",
+    "decode_interface",
+    "decode_monitor_value",
     "decode_number",
     "decode_status_value",
     "value_text",
@@ -30,6 +38,8 @@ __all__ = [
 _NUMBER: Final = re.compile(r"(?<![A-Za-z\d.])([-+]?)\s*(\d+(?:\.\d*)?|\.\d+)")
 _HEAD: Final = re.compile(r"[SPVN]\d+\s*[:=]?|[:=]")
 _BITS: Final = re.compile(r"[01]{8}")
+_WHOLE: Final = re.compile(r"[-+]?\d{1,15}")
+_BROKEN: Final = re.compile(r"[-+]?(?:\d{1,15}\.\d*|\.\d+)")
 _FACTS: Final = {fact.number: fact for fact in STATUS_VALUES}
 
 
@@ -88,9 +98,68 @@ class StatusValue:
     number: int
     raw: str
     value: float | str | tuple[int, ...]
-    """A number; binary digits without the blank; codes; or the text, where the form is not documented."""
+    """
+    A number; binary digits without the blank; codes. Where the form is not documented (S19-S29, S31 and up): a number
+    if the answer is nothing else, whole if it has no point; else the text.
+    """
     meaning: str
     unit: str | None
+    certainty: Certainty = Certainty.DOCUMENTED
+    """Of meaning and unit."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MonitorValue:
+    """S13, S14 or S15, and what it shows: a quantity that a parameter chooses (UG p. 211)."""
+
+    number: int
+    chosen: int
+    """The number of the quantity: the value of P233, P234 or P182."""
+    raw: str
+    value: float
+    meaning: str
+    unit: str | None
+    """None where the quantity has none, or is not known."""
+    certainty: Certainty
+    """Of meaning and unit; UNKNOWN for quantities 1 to 16, whose page was not available."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SerialInterface:
+    """
+    P20, how the serial interface behaves (UG p. 166).
+
+    Which bits stand for Xon/Xoff and for suppressed errors is inferred from the documented values 3 and 19.
+    """
+
+    xonxoff: bool
+    errors_suppressed: bool
+    """A refused command is answered as an accepted one is, or not at all."""
+    binary: bool
+    """Binary transfer beside ASCII; documented."""
+    raw: int
+    unknown: int
+    """The weights of *raw* that no page at hand explains, added up; 0 if there are none."""
+
+    @classmethod
+    def decode(cls, p20: float) -> SerialInterface:
+        """
+        Decode the value of P20.
+
+        Raises:
+            UnexpectedAnswerError: It is not a whole number from 0 on.
+        """
+        if not isfinite(p20) or p20 != int(p20) or p20 < 0:
+            raise UnexpectedAnswerError(f"P20 is a whole number of bits (UG p. 166), not {p20!r}")
+        raw = int(p20)
+        known = sum(bit.weight for bit in INTERFACE_BITS if bit.name)
+        return cls(
+            xonxoff=bool(raw & XONXOFF_BIT.weight),
+            errors_suppressed=bool(raw & ERRORS_SUPPRESSED_BIT.weight),
+            binary=bool(raw & BINARY_BIT.weight),
+            raw=raw,
+            unknown=raw & ~known,
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -129,17 +198,71 @@ def decode_status_value(number: int, answer: str, axis_unit: str) -> StatusValue
     Raises:
         UnexpectedAnswerError: The answer has not the form that the table gives.
     """
-    fact = _FACTS.get(number) or StatusFact(number=number, meaning="unknown", unit=None, form=Form.TEXT, source="")
+    fact = _FACTS.get(number) or StatusFact(
+        number=number, meaning="unknown", unit=None, form=Form.UNKNOWN, source="", certainty=Certainty.UNKNOWN
+    )
     raw = value_text(answer)
-    value: float | str | tuple[int, ...] = raw
+    value: float | str | tuple[int, ...]
     if fact.form is Form.NUMBER:
         value = decode_number(answer)
     elif fact.form is Form.BITS:
         value = _bits(answer)
     elif fact.form in (Form.HISTORY, Form.PAIR):
         value = tuple(_codes(answer))
-    unit = axis_unit if fact.unit == "axis" else fact.unit
-    return StatusValue(number=number, raw=raw, value=value, meaning=fact.meaning, unit=unit)
+    else:
+        value = _number_or_text(raw)
+    return StatusValue(
+        number=number,
+        raw=raw,
+        value=value,
+        meaning=fact.meaning,
+        unit=_spelt(fact.unit, axis_unit),
+        certainty=fact.certainty,
+    )
+
+
+def decode_monitor_value(number: int, chosen: str, answer: str, axis_unit: str) -> MonitorValue:
+    """
+    Decode the answer to S13, S14 or S15 by the quantity that its parameter chooses (UG p. 211).
+
+    Args:
+        number: 13, 14 or 15.
+        chosen: The answer to P233, P234 or P182.
+        answer: The answer to ``S<number>``.
+        axis_unit: Of positions.
+
+    Raises:
+        UnexpectedAnswerError: An answer is no number, or *chosen* no whole one.
+    """
+    selector = decode_number(chosen)
+    if not isfinite(selector) or selector != int(selector):
+        raise UnexpectedAnswerError(
+            f"P{SELECTORS[number]} chooses a quantity by a whole number (UG p. 211)", received=chosen
+        )
+    fact = quantity(int(selector))
+    return MonitorValue(
+        number=number,
+        chosen=fact.number,
+        raw=value_text(answer),
+        value=decode_number(answer),
+        meaning=fact.meaning,
+        unit=_spelt(fact.unit, axis_unit),
+        certainty=fact.certainty,
+    )
+
+
+def decode_interface(answer: str) -> SerialInterface:
+    """
+    Decode the answer to P20 (UG p. 166).
+
+    Raises:
+        UnexpectedAnswerError: It is not a whole number from 0 on.
+    """
+    try:
+        return SerialInterface.decode(decode_number(answer))
+    except UnexpectedAnswerError as error:
+        error.received = answer
+        raise
 
 
 def decode_history(answer: str) -> tuple[HistoryEntry, ...]:
@@ -161,6 +284,16 @@ def decode_history(answer: str) -> tuple[HistoryEntry, ...]:
 def decode_error(answer: str) -> DeviceError | None:
     """Decode S30, one number or two in an order that is not documented: the first that is not zero (IBS p. 12)."""
     return next((device_error(code) for code in _codes(answer) if code), None)
+
+
+def _spelt(unit: str | None, axis_unit: str) -> str | None:
+    return axis_unit if unit == "axis" else unit
+
+
+def _number_or_text(raw: str) -> float | str:
+    if _WHOLE.fullmatch(raw):
+        return int(raw)
+    return float(raw) if _BROKEN.fullmatch(raw) else raw
 
 
 def _bits(answer: str) -> str:

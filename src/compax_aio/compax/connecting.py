@@ -28,6 +28,7 @@ def connect(url: str, *, name: str | None = None, settings: DriveSettings | None
 
     Raises (when awaited or entered):
         TransportError: The line cannot be opened; the error says why.
+        UnexpectedAnswerError: Another device answers, such as a Compax3.
         AnswerTimeoutError: Nothing on it answers as a COMPAX would.
     """
     return Connecting(url, name or str(TransportURL.parse(url)).partition("?")[0], settings or DriveSettings())

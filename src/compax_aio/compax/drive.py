@@ -5,13 +5,14 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Iterable
 from types import TracebackType
-from typing import Self
+from typing import Self, Unpack
 
 from ..errors import ConnectionLostError, InvalidCommandError
 from ..link.cancellation import despite_cancellation
-from ..link.contract import Event, Lane
+from ..link.contract import Event
 from ..link.link import LinkStats
-from .codecs import DriveStatus
+from .axis import AxisCommands
+from .codecs import DriveStatus, SerialInterface
 from .events import (
     ComparatorPassed,
     ConnectionLost,
@@ -24,26 +25,30 @@ from .events import (
 from .facts.device_errors import DeviceError
 from .line import DriveLine
 from .motion import Motion
-from .moves import Move, OnCancel
+from .moves import Move, OnCancel, PreparedMove
 from .observer import Observer
 from .parameters import VARIABLE_TABLE, NumberedValues, Parameters
 from .plain_line import check_line, is_query, starts_motion
+from .poller import Poller
+from .program_memory import ProgramMemory
 from .protocol import ComparatorReached, PositionReached, Stray
 from .readings import Readings
 from .settings import DriveSettings
 from .vocabulary import (
     Comparator,
+    MoveOptions,
     MovePlan,
     SpeedStep,
     plan_home,
     plan_move_by,
     plan_move_to,
 )
+from .watch import Watch
 
 __all__ = ["Drive"]
 
 
-class Drive(Readings):
+class Drive(Readings, AxisCommands):
     """
     One COMPAX drive on an open line; made by :func:`compax_aio.connect`.
 
@@ -54,6 +59,7 @@ class Drive(Readings):
     Attributes:
         parameters: P1-P250, read, written, saved and restored.
         variables: V1-V39 and V50-V70, likewise.
+        program: The records N001-N250, and the program that they are.
     """
 
     def __init__(self, name: str, settings: DriveSettings) -> None:
@@ -65,11 +71,14 @@ class Drive(Readings):
         self._motion = Motion(self._observer)
         self.parameters = Parameters(line)
         self.variables = NumberedValues(line, VARIABLE_TABLE)
+        self.program = ProgramMemory(self._observer, self._motion)
+        self._poller = Poller(line, self, self.parameters, self.variables)
 
     async def _open(self, url: str) -> None:
         await self._line.link.open(url)
         try:
             await self._motion.look_around()
+            await self._line.read_interface()
         except BaseException:
             await self._line.link.close()
             raise
@@ -167,6 +176,37 @@ class Drive(Readings):
         """Start a motion that was planned for this drive before; see :meth:`move_to`."""
         return self._motion.start(plan, timeout_s, on_cancel)
 
+    def prepare_move_to(
+        self,
+        position: float,
+        *,
+        timeout_s: float | None = None,
+        on_cancel: OnCancel = "stop",
+        **options: Unpack[MoveOptions],
+    ) -> PreparedMove:
+        """
+        Let the drive hold an absolute move ready (``,``, UG p. 160), to be started by :meth:`PreparedMove.trigger`.
+
+        Takes and raises what :meth:`move_to` does. It is confirmed by the drive's status, unless
+        ``DriveSettings.message_when_prepared`` lets it ask for ``$`` as well.
+        """
+        return self.prepare(plan_move_to(position, self.settings, **options), timeout_s=timeout_s, on_cancel=on_cancel)
+
+    def prepare_move_by(
+        self,
+        distance: float,
+        *,
+        timeout_s: float | None = None,
+        on_cancel: OnCancel = "stop",
+        **options: Unpack[MoveOptions],
+    ) -> PreparedMove:
+        """Let the drive hold a relative move ready; see :meth:`prepare_move_to` and :meth:`move_by`."""
+        return self.prepare(plan_move_by(distance, self.settings, **options), timeout_s=timeout_s, on_cancel=on_cancel)
+
+    def prepare(self, plan: MovePlan, *, timeout_s: float | None = None, on_cancel: OnCancel = "stop") -> PreparedMove:
+        """Let the drive hold a motion ready that was planned for it before; see :meth:`prepare_move_to`."""
+        return self._motion.prepare(plan, timeout_s, on_cancel)
+
     async def stop(self) -> None:
         """
         Stop the drive ahead of everything that is queued, and return at its standstill.
@@ -199,13 +239,13 @@ class Drive(Readings):
         Raises:
             InvalidCommandError: *text* is not one plain line of at most 30 characters; nothing was sent.
             MoveActiveError, MoveInDoubtError: It starts a motion, and a move is running or in doubt; nothing was sent.
+            MoveStoppedError: It starts a motion, and a stop came before it was sent.
         """
         line = check_line(text.upper())
         if is_query(line):
             return await self._line.query(line)
         if starts_motion(line):
-            self._motion.note_untracked(line)
-            await self._line.command(line, Lane.MOTION)
+            await self._motion.tell(line)
         else:
             await self._line.command(line)
         return ""
@@ -231,10 +271,31 @@ class Drive(Readings):
         """Follow what happens from now on: messages, faults, the line; an asynchronous iterator."""
         return self._events.stream()
 
+    def watch(self, *quantities: str, interval_s: float = 0.2) -> Watch:
+        """
+        Read quantities again and again, once for all who watch; an asynchronous iterator of readings.
+
+        It goes last on the line, and takes half of it at most: while others need it, readings come more rarely.
+
+        Args:
+            quantities: ``position``, ``target``, ``following_error``, ``speed``, ``torque``, ``status``, ``error``,
+                ``error_history``, or by number ``S1`` to ``S250``, ``P1`` to ``P250``, ``V1`` to ``V70``.
+            interval_s: Seconds from one reading to the next, above 0; at whole multiples of it on the loop's clock.
+
+        Raises:
+            InvalidCommandError: A quantity is not known, or *interval_s* is no time; nothing was sent.
+        """
+        return self._poller.watch(quantities, interval_s)
+
     @property
     def settings(self) -> DriveSettings:
         """What is known of this drive."""
         return self._line.settings
+
+    @property
+    def interface(self) -> SerialInterface | None:
+        """What P20 said at connect about errors, handshake and binary transfer; None where it could not be read."""
+        return self._line.interface
 
     @property
     def stats(self) -> LinkStats:
@@ -266,6 +327,7 @@ class Drive(Readings):
         finally:
             await self._line.link.close()
             self._events.end()
+            self._poller.end()
 
     async def __aenter__(self) -> Self:
         return self
@@ -294,4 +356,5 @@ class Drive(Readings):
 
     def _on_lost(self, error: ConnectionLostError) -> None:
         self._events.publish(ConnectionLost(self.name, self._loop.time(), str(error)))
+        self._poller.lost(error)
         self._motion.line_lost()

@@ -11,9 +11,10 @@ from ..errors import InvalidCommandError, MoveStoppedError
 from ..link.cancellation import despite_cancellation
 from .connecting import Connecting, connect
 from .drive import Drive
-from .moves import Move, MoveResult, fetch_error
+from .moves import Move, MoveResult, PreparedMove, fetch_error
 from .settings import DriveSettings
 from .vocabulary import MovePlan, plan_home, plan_move_to
+from .watch import GroupWatch
 
 __all__ = ["DriveGroup", "GroupMove"]
 
@@ -32,7 +33,7 @@ class GroupMove(asyncio.Future[dict[str, MoveResult]]):
         accepted: A future that is done when every drive's prompt came back.
     """
 
-    def __init__(self, moves: Mapping[str, Move]) -> None:
+    def __init__(self, moves: Mapping[str, PreparedMove]) -> None:
         super().__init__()
         self.moves = dict(moves)
         self.accepted: asyncio.Future[None] = self.get_loop().create_future()
@@ -54,7 +55,7 @@ class GroupMove(asyncio.Future[dict[str, MoveResult]]):
 
     async def _watch(self) -> None:
         try:
-            if await _all_succeed([move.accepted for move in self.moves.values()]):
+            if await self._start_together():
                 if not self.accepted.done():
                     self.accepted.set_result(None)
                 await _all_succeed(list(self.moves.values()))
@@ -65,6 +66,16 @@ class GroupMove(asyncio.Future[dict[str, MoveResult]]):
             self.cancel()
             raise
         self._report()
+
+    async def _start_together(self) -> bool:
+        """Let every drive hold its move ready; then send nothing but the triggers, to all lines in one go."""
+        if not await _all_succeed([move.ready for move in self.moves.values()]):
+            return False
+        if any(move.done() for move in self.moves.values()):  # stopped, or failed, since it was ready
+            return False
+        for move in self.moves.values():
+            move.trigger()
+        return await _all_succeed([move.accepted for move in self.moves.values()])
 
     def _report(self) -> None:
         errors = {axis: move.exception() for axis, move in self.moves.items() if not move.cancelled()}
@@ -149,9 +160,10 @@ class DriveGroup:
         **targets: float,
     ) -> GroupMove:
         """
-        Start absolute moves of the axes named, ``move_to(x=10, y=20)``; the settings go to all of them.
+        Start absolute moves of the axes named, ``move_to(x=10, y=20)``, together; the settings go to all of them.
 
-        Every target is checked, and every drive free, before a byte is sent to any.
+        Every target is checked, and every drive free, before a byte is sent to any. Then each drive is told its move to
+        hold it ready, and when all do, the triggers are sent (``,`` and ``!``, UG p. 160).
 
         Raises:
             InvalidCommandError: An axis is unknown, or a target cannot be said to its drive; nothing was sent.
@@ -185,6 +197,16 @@ class DriveGroup:
         """Read the actual position of every axis, all lines at once."""
         return await _all_at_once({axis: drive.position() for axis, drive in self.drives.items()})
 
+    def watch(self, *quantities: str, interval_s: float = 0.2) -> GroupWatch:
+        """
+        Read quantities of every axis again and again; an asynchronous iterator of readings by axis.
+
+        ``async for reading in group.watch("position"): print(reading["x"]["position"])``; see :meth:`Drive.watch`.
+        """
+        return GroupWatch(
+            {axis: drive.watch(*quantities, interval_s=interval_s) for axis, drive in self.drives.items()}
+        )
+
     async def close(self) -> None:
         """Stop what moves, all lines at once, and close them; see :meth:`Drive.close`."""
         await _all_at_once({axis: drive.close() for axis, drive in self.drives.items()})
@@ -201,7 +223,7 @@ class DriveGroup:
             raise InvalidCommandError("no axis was named, so nothing moves")
         for axis, plan in plans.items():
             self.drives[axis].check(plan)
-        return GroupMove({axis: self.drives[axis].start(plan, timeout_s=timeout_s) for axis, plan in plans.items()})
+        return GroupMove({axis: self.drives[axis].prepare(plan, timeout_s=timeout_s) for axis, plan in plans.items()})
 
 
 async def _open(connecting: Connecting) -> Drive:

@@ -4,25 +4,25 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from typing import get_args
 
 from ..errors import (
     CommandRejectedError,
     CompaxError,
-    InvalidCommandError,
     MoveActiveError,
     MoveError,
     MoveInDoubtError,
     MoveTimeoutError,
     UnexpectedAnswerError,
 )
+from ..link.contract import Lane
 from .codecs import DriveStatus
-from .moves import Move, OnCancel, fetch_error
+from .memory import Memory
+from .moves import Move, OnCancel, PreparedMove, check_manner, fetch_error
 from .observer import Observer
-from .pursuit import Memory, Pursuit
+from .pursuit import Pursuit
 from .reports import Reports
 from .stopping import Stop
-from .vocabulary import MovePlan, check_number
+from .vocabulary import MovePlan, change_of_speed
 
 __all__ = ["Motion"]
 
@@ -47,13 +47,23 @@ class Motion:
         self._active: Pursuit | None = None
         self._task: asyncio.Task[None] | None = None
         self._stopping: asyncio.Task[None] | None = None
+        self._telling: asyncio.Task[None] | None = None
+        self.stops = 0
+        """How many times a stop has been asked for."""
+        self._timeout_s: float | None = None
 
     # Starting -------------------------------------------------------------------------------------------------------
 
     def check(self, plan: MovePlan) -> None:
         """Raise what :meth:`start` would raise."""
-        self._refuse_second(plan.description)
+        self.refuse_second(plan.description)
         self._refuse_in_doubt(plan.description)
+        if self._memory.speed_is_unknown and not plan.sets_speed and not plan.finds_machine_zero:
+            raise MoveError(
+                f"{plan.description} was not sent: a binary motion was cut, and may have changed the speed in force",
+                device=self.name,
+                hint="give the move its speed_percent",
+            )
         if self._memory.points_prepared and not plan.finds_machine_zero:
             raise MoveError(
                 f"{plan.description} was not sent: the drive still holds {self._memory.points_prepared} speed steps or "
@@ -72,21 +82,69 @@ class Motion:
             MoveError: Points prepared for a move that never started would act on this one.
             InvalidCommandError: *timeout_s* or *on_cancel* means nothing.
         """
-        if timeout_s is not None and not check_number("timeout_s", timeout_s) > 0:
-            raise InvalidCommandError(f"timeout_s must be above 0, not {timeout_s!r}")
-        if on_cancel not in get_args(OnCancel):
-            raise InvalidCommandError(f"on_cancel is 'stop' or 'detach', not {on_cancel!r}")
+        check_manner(timeout_s, on_cancel)
         self.check(plan)
-        self._release()
         move = Move(self, plan, on_cancel)
+        self._begin(move)
+        self._limit(move, timeout_s)
+        return move
+
+    def prepare(self, plan: MovePlan, timeout_s: float | None, on_cancel: OnCancel) -> PreparedMove:
+        """Let the drive hold *plan* ready, and start it when triggered; *timeout_s* counts from then."""
+        check_manner(timeout_s, on_cancel)
+        self.check(plan)
+        move = PreparedMove(self, plan, on_cancel)
+        self._timeout_s = timeout_s
+        self._begin(move)
+        return move
+
+    def trigger(self, move: PreparedMove) -> None:
+        """Start *move*, which the drive must hold ready."""
+        if not self._is_active(move) or not move.ready.done() or move.triggered.is_set():
+            why = "it has been triggered or has ended" if move.ready.done() else "the drive does not hold it ready yet"
+            raise MoveError(
+                f"{move.plan.description} was not triggered: {why}", device=self.name, hint="await move.ready before"
+            )
+        move.triggered.set()
+        self._limit(move, self._timeout_s)
+
+    def _begin(self, move: Move) -> None:
+        self._release()
         self._active = Pursuit(move, self._observer, self._memory)
-        self._task = self._loop.create_task(self._pursue(self._active), name=f"{self.name}: {plan.description}")
+        self._task = self._loop.create_task(self._pursue(self._active), name=f"{self.name}: {move.plan.description}")
+        # Whatever ends the move, by whoever's hand: the drive is free for the next.
+        move.add_done_callback(self._move_done)
+
+    def _limit(self, move: Move, timeout_s: float | None) -> None:
         if timeout_s is not None:
             timer = self._loop.call_later(timeout_s, self._time_is_up, move, timeout_s)
             move.add_done_callback(lambda _: timer.cancel())
-        # Whatever ends the move, by whoever's hand: the drive is free for the next.
-        move.add_done_callback(self._move_done)
-        return move
+
+    async def change_speed(self, move: Move, speed_percent: int) -> None:
+        """Let *move*, which must run, go on at another speed."""
+        text = change_of_speed(speed_percent, self._observer.line.settings)
+        if not self._is_active(move) or not move.is_on_wire:
+            raise MoveError(
+                f"{move.plan.description} does not run, so its speed cannot be changed",
+                device=self.name,
+                hint="give a move its speed with speed_percent=",
+            )
+        came_late = False
+
+        def on_sent() -> None:
+            nonlocal came_late
+            came_late = move.done()
+
+        await self._observer.line.command(text, Lane.CONTROL, on_sent)
+        if came_late:
+            # Taken by a drive that stood, it may be a speed step at the beginning of the next move.
+            self._memory.points_prepared += 1
+            raise MoveError(
+                f"{move.plan.description} ended before its new speed was sent, which may act on the next move",
+                device=self.name,
+                sent=text,
+                hint="home() cancels it (UG p. 101)",
+            )
 
     async def _pursue(self, pursuit: Pursuit) -> None:
         try:
@@ -111,13 +169,57 @@ class Motion:
                 await asyncio.wait([self._stopping])
             raise
 
-    def note_untracked(self, text: str) -> None:
-        """Take note of a motion that is sent as a raw command; it is refused like any other."""
-        self._refuse_second(repr(text))
+    async def tell(self, text: str, *, unless_stopped_since: int | None = None) -> None:
+        """
+        Send *text*, which starts a motion that nobody watches, after a stop that is under way.
+
+        Leaving the block stops it; a stop that comes before it is written takes it back.
+
+        Args:
+            text: One checked line.
+            unless_stopped_since: What :attr:`stops` was when the caller began; a stop since then counts as well.
+
+        Raises:
+            MoveActiveError, MoveInDoubtError: Another move runs or is in doubt; nothing was sent.
+            MoveStoppedError: A stop came before it was sent.
+            CommandRejectedError, UnexpectedAnswerError, AnswerTimeoutError, ConnectionLostError: As for any line.
+        """
+        stops = self.stops if unless_stopped_since is None else unless_stopped_since
+        if self._stopping is not None:
+            await asyncio.wait([self._stopping])
+        self.refuse_second(repr(text))
         self._refuse_in_doubt(repr(text))
+        if self.stops != stops:
+            raise self._reports.taken_back(text)
+        telling = self._loop.create_task(self._observer.line.command(text, Lane.MOTION, self._note_untracked))
+        self._telling = telling
+        try:
+            await telling
+        except asyncio.CancelledError:
+            task = asyncio.current_task()
+            if self._telling is telling or (task is not None and task.cancelling()):
+                raise
+            raise self._reports.taken_back(text) from None
+        finally:
+            if self._telling is telling:
+                self._telling = None
+
+    def _note_untracked(self) -> None:
+        """Take note that the line which is being told is written."""
+        self._telling = None
         self._has_untracked_motion = True
 
-    def _refuse_second(self, what: str) -> None:
+    def note_untracked(self, *, ended: bool = False) -> None:
+        """Take note of a motion that nobody watches, so that leaving the block stops it; or of its end."""
+        self._has_untracked_motion = not ended
+
+    def note_doubt(self, why: str) -> None:
+        """Take no motion from here until :meth:`reconcile`; what may be moving is stopped when the block is left."""
+        self._memory.doubt = why
+        self._has_untracked_motion = True
+
+    def refuse_second(self, what: str) -> None:
+        """Raise MoveActiveError if a move runs: *what* was not sent."""
         if self._active is not None and not self._active.move.done():
             raise MoveActiveError(
                 f"{self._active.move.plan.description} is running, so {what} was not sent",
@@ -174,7 +276,8 @@ class Motion:
             self._memory.messages_owed = int(status.command_active)
 
     async def reconcile(self) -> DriveStatus:
-        """Read status and position, and end the doubt."""
+        """Read status and position, and end the doubt; a line that is held goes on by the caller's word."""
+        self._observer.line.link.resume()
         look = await self._observer.look()
         self._memory.doubt = None
         self._has_untracked_motion &= look.status.command_active
@@ -189,6 +292,8 @@ class Motion:
         Args:
             reason: What the move that is stopped shall raise, if not MoveStoppedError.
         """
+        self.stops += 1
+        self._take_back()
         pursuit = self._release()
         if pursuit is not None and reason is None:
             # Whoever stops a move from here knows; it is no news that nobody fetched.
@@ -249,16 +354,28 @@ class Motion:
     async def end(self) -> None:
         """Stop what was started here, unless it was to go on; raises what a stop raises."""
         move = self._active.move if self._active is not None else None
+        self._take_back()
         if move is not None:
             move.add_done_callback(fetch_error)
         if move is not None and not move.is_on_wire:
             self._withdraw(move, self._reports.withdrawn(move))
         elif move is not None and move.on_cancel == "detach":
             self._withdraw(move, self._reports.unwatched(move))
+        elif (hold := self._observer.line.link.held) is not None:
+            # Nobody has asked for a stop, and its bytes could complete a motion that never began.
+            raise MoveInDoubtError(
+                f"the line was closed without a stop, for {hold.why}", device=self.name, hint=hold.remedy
+            )
         elif move is not None or self._has_untracked_motion:
             self.begin_stop()
         if self._stopping is not None:
             await asyncio.shield(self._stopping)
+
+    def _take_back(self) -> None:
+        """Let an untracked motion that still waits for its turn never be sent."""
+        if self._telling is not None:
+            telling, self._telling = self._telling, None
+            telling.cancel()
 
     def _is_active(self, move: Move) -> bool:
         return self._active is not None and self._active.move is move

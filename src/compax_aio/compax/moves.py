@@ -5,12 +5,12 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Any, Literal, Protocol, get_args
 
-from ..errors import CompaxError
-from .vocabulary import MovePlan
+from ..errors import CompaxError, InvalidCommandError
+from .vocabulary import MovePlan, check_number
 
-__all__ = ["Move", "MoveOwner", "MoveResult", "OnCancel", "fetch_error"]
+__all__ = ["Move", "MoveOwner", "MoveResult", "OnCancel", "PreparedMove", "check_manner", "fetch_error"]
 
 OnCancel = Literal["stop", "detach"]
 
@@ -51,6 +51,12 @@ class MoveOwner(Protocol):
 
     async def read_position(self) -> float:
         """Ask the drive where it is."""
+
+    async def change_speed(self, move: Move, speed_percent: int) -> None:
+        """Let *move*, which must run, go on at another speed."""
+
+    def trigger(self, move: PreparedMove) -> None:
+        """Start *move*, which the drive must hold ready."""
 
 
 class Move(asyncio.Future[MoveResult]):
@@ -106,6 +112,20 @@ class Move(asyncio.Future[MoveResult]):
             AnswerTimeoutError, CommandRejectedError, MoveTimeoutError, ConnectionLostError: It may not have stopped.
         """
         await self._owner.stop_move(self)
+
+    async def change_speed(self, speed_percent: int) -> None:
+        """
+        Go on at another speed from now on, while the move runs (by inference from IBS p. 42; a word of the dialect).
+
+        Args:
+            speed_percent: Of nominal speed, a whole number above 0, at most the settings' ``speed_limit_percent``.
+
+        Raises:
+            InvalidCommandError: The drive cannot be told this; nothing was sent.
+            MoveError: The move does not run, or ended before the new speed was sent.
+            CommandRejectedError: The drive refused it; the move goes on as it was.
+        """
+        await self._owner.change_speed(self, speed_percent)
 
     async def positions(self, *, interval_s: float = 0.05) -> AsyncIterator[float]:
         """
@@ -192,6 +212,65 @@ class Move(asyncio.Future[MoveResult]):
             self.accepted.set_exception(error)
         if not self.done():
             self.set_exception(error)
+
+
+class PreparedMove(Move):
+    """
+    A move that the drive holds ready in its intermediate memory (``,``, UG p. 160) until :meth:`trigger` (``!``).
+
+    So several drives begin at the same time: prepare all of them, and then send no more than the triggers. Until it is
+    triggered nothing moves, and cancelling or stopping it only forgets it.
+
+    Attributes:
+        ready: A future that is done when the drive holds the move, or raises why it does not.
+    """
+
+    def __init__(self, owner: MoveOwner, plan: MovePlan, on_cancel: OnCancel) -> None:
+        super().__init__(owner, plan, on_cancel)
+        self.ready: asyncio.Future[None] = self.get_loop().create_future()
+        self.ready.add_done_callback(fetch_error)
+        self.triggered = asyncio.Event()
+
+    def trigger(self) -> None:
+        """
+        Start the move; it is sent in the next turn of the event loop.
+
+        Where something else went over the line since the drive took the move, the motion itself is sent in place of
+        ``!``: no page says what the intermediate memory holds then.
+
+        Raises:
+            MoveError: It is not ready, was triggered before, or has ended.
+        """
+        self._owner.trigger(self)
+
+    def cancel(self, msg: Any = None) -> bool:
+        """Give the move up; see :meth:`Move.cancel`."""
+        self.ready.cancel(msg)
+        return super().cancel(msg)
+
+    def note_ready(self) -> None:
+        """Note that the drive holds the move."""
+        if not self.ready.done():
+            self.ready.set_result(None)
+
+    def fail(self, error: CompaxError) -> None:
+        """Raise *error* in whoever awaits the move, its readiness, or its acceptance."""
+        if not self.ready.done():
+            self.ready.set_exception(error)
+        super().fail(error)
+
+
+def check_manner(timeout_s: float | None, on_cancel: OnCancel) -> None:
+    """
+    Check what a move is told about itself.
+
+    Raises:
+        InvalidCommandError: It means nothing.
+    """
+    if timeout_s is not None and not check_number("timeout_s", timeout_s) > 0:
+        raise InvalidCommandError(f"timeout_s must be above 0, not {timeout_s!r}")
+    if on_cancel not in get_args(OnCancel):
+        raise InvalidCommandError(f"on_cancel is 'stop' or 'detach', not {on_cancel!r}")
 
 
 def fetch_error(future: asyncio.Future[Any]) -> None:

@@ -10,7 +10,7 @@ from typing import TypeVar
 from ..errors import AnswerTimeoutError, CommandRejectedError, CompaxError, ConnectionLostError, UnexpectedAnswerError
 from ..link.contract import Lane
 from .codecs import DriveStatus, decode_error
-from .facts.device_errors import DeviceError
+from .facts.device_errors import FAULT_CODES, DeviceError
 from .line import DriveLine
 
 __all__ = ["Look", "Observer"]
@@ -49,12 +49,27 @@ class Observer:
     async def read_status(self, lane: Lane = Lane.CONTROL) -> DriveStatus:
         """Read S16 and S17; a fault they show is told to whoever follows the drive's events."""
         status = await self.line.status(lane)
-        if status.no_fault:
+        await self.note(no_fault=status.no_fault)
+        return status
+
+    async def note(self, *, no_fault: bool) -> None:
+        """Take note of S16 bit 1; a fault that is new is told to whoever follows the drive's events."""
+        if no_fault:
             self._faulted = False
         elif not self._faulted:
             self._faulted = True
-            self._on_fault(await self.read_error())
-        return status
+            try:
+                error = await self.read_error()
+            except BaseException:
+                self._faulted = False  # the next look tells it
+                raise
+            self._on_fault(error)
+
+    def note_error(self, error: DeviceError | None) -> None:
+        """Take note of what S30 says; a fault that is new is told likewise."""
+        if error is not None and error.code in FAULT_CODES and not self._faulted:
+            self._faulted = True
+            self._on_fault(error)
 
     async def read_error(self) -> DeviceError | None:
         """Read S30; None also where the drive does not say, or cannot be heard: the fault itself is known already."""

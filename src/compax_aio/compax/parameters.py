@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
-from typing import Final
 
 from ..errors import (
     CommandRejectedError,
@@ -22,20 +21,11 @@ from ..link.cancellation import despite_cancellation
 from ..link.contract import Lane
 from .codecs import decode_number
 from .facts.limits import MAX_POSITION
-from .facts.parameters import (
-    CONTROL_PARAMETERS,
-    MAX_PARAMETER,
-    PARAMETERS,
-    PASSWORD_OFF,
-    PASSWORD_ON,
-    VARIABLE_DECIMALS,
-    VARIABLES,
-    ParameterFact,
-    parameter_decimals,
-)
+from .facts.parameters import PASSWORD_OFF, PASSWORD_ON
 from .line import DriveLine
 from .plain_line import check_line
 from .value_file import read_file, write_file
+from .value_tables import PARAMETER_TABLE, VARIABLE_TABLE, ValueTable
 from .vocabulary import check_number
 
 __all__ = [
@@ -46,7 +36,6 @@ __all__ = [
     "Parameters",
     "Progress",
     "Restored",
-    "ValueTable",
 ]
 
 Progress = Callable[[int, int], None]
@@ -72,32 +61,8 @@ class Restored:
     """By number: what the drive had, and what it has now (or would have, after a dry run)."""
     unchanged: int
     was_dry_run: bool
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ValueTable:
-    """One kind of numbered values: which there are, and how exact each is."""
-
-    kind: str
-    """For people, and the name of the table in a file."""
-    letter: str
-    decimals: Mapping[int, int]
-    """By number."""
-    facts: Mapping[int, ParameterFact]
-    """Those whose meaning is known."""
-
-
-PARAMETER_TABLE: Final = ValueTable(
-    kind="parameters",
-    letter="P",
-    decimals={number: parameter_decimals(number) for number in range(1, MAX_PARAMETER + 1)},
-    facts={fact.number: fact for fact in PARAMETERS},
-)
-
-VARIABLE_TABLE: Final = ValueTable(
-    kind="variables", letter="V", decimals=dict.fromkeys(VARIABLES, VARIABLE_DECIMALS), facts={}
-)
-"""V1-V39 and V50-V70 (UG p. 100, 104)."""
+    pending: tuple[int, ...] = ()
+    """Those of *changed* that are not in force before :meth:`Parameters.make_valid`."""
 
 
 class NumberedValues:
@@ -136,7 +101,7 @@ class NumberedValues:
             AnswerTimeoutError: Whether the drive took it is unknown; read it.
         """
         text = self._written(number, value)
-        await self._line.command(text)
+        await self._tell(number, text)
         read_back = await self.read(number)
         if read_back != self._rounded(number, value):
             raise UnexpectedAnswerError(
@@ -208,7 +173,7 @@ class NumberedValues:
         self, path: str | Path, *, dry_run: bool = False, on_progress: Progress | None = None
     ) -> Restored:
         """
-        Write what differs from a saved file, each value read back; the first refusal ends it.
+        Write what differs from a saved file, each value read back; the first that fails ends it.
 
         Args:
             path: A file of :meth:`save`.
@@ -217,39 +182,84 @@ class NumberedValues:
 
         Raises:
             InvalidCommandError: The file holds something that cannot be said to the drive; nothing was written.
-            RestoreIncompleteError: A value was refused, or its fate is unknown; says which were applied and which
-                not. :meth:`roll_back` takes them back.
+            RestoreIncompleteError: A value was refused, was not read back as written, or its fate is unknown; says
+                which were applied, which not, and which is uncertain. :meth:`roll_back` takes them back.
         """
         values = await self._load(path)
-        changes = {each.number: (each.in_drive, each.in_file) for each in await self._compare(values)}
+        changes = self._changes(await self._compare(values))
         applied: dict[int, tuple[float, float]] = {}
-        for number, (old, new) in changes.items():
-            try:
-                if old is None:
-                    raise InvalidCommandError(f"the drive does not give {self._name(number)}, so it is not written")
-                if not dry_run:
-                    await self.write(number, new)
-            except CompaxError as error:
-                left = [self._name(each) for each in changes if each not in applied]
-                raise RestoreIncompleteError(
-                    f"{self._name(number)} = {new:g} was not restored: {error.what}; "
-                    f"applied: {', '.join(map(self._name, applied)) or 'none'}; not applied: {', '.join(left)}",
-                    device=self._line.name,
-                    sent=error.sent,
-                    received=error.received,
-                    hint="mend the cause and restore again, or roll_back() what was applied",
-                    applied=applied,
-                    not_applied=tuple(number for number in changes if number not in applied),
-                ) from error
-            applied[number] = (old, new)
+        for number, change in changes.items():
+            if not dry_run:
+                try:
+                    await self.write(number, change[1])
+                except CompaxError as error:
+                    raise self._incomplete(error, number, changes, applied) from error
+            applied[number] = change
             if on_progress is not None:
                 on_progress(len(applied), len(changes))
-        return Restored(changed=applied, unchanged=len(values) - len(changes), was_dry_run=dry_run)
+        return Restored(
+            changed=applied,
+            unchanged=len(values) - len(changes),
+            was_dry_run=dry_run,
+            pending=self._waiting(applied),
+        )
 
     async def roll_back(self, error: RestoreIncompleteError) -> None:
-        """Write the values that the drive had before a restore that was not completed."""
-        for number, (old, _) in reversed(error.applied.items()):
+        """
+        Write the values that the drive had before a restore that was not completed, the uncertain ones first.
+
+        The first that fails raises, as in :meth:`write`, and ends it; it can be repeated.
+        """
+        for number, (old, _) in (*reversed(error.uncertain.items()), *reversed(error.applied.items())):
             await self.write(number, old)
+
+    def _changes(self, differences: Iterable[Difference]) -> dict[int, tuple[float, float]]:
+        changes = {each.number: (each.in_drive, each.in_file) for each in differences}
+        known = {number: (old, new) for number, (old, new) in changes.items() if old is not None}
+        if missing := [self._name(number) for number in changes if number not in known]:
+            raise RestoreIncompleteError(
+                f"nothing was written: the drive does not give {', '.join(missing)}",
+                device=self._line.name,
+                hint="is the file that of another drive? take them out of it, or write them one by one",
+                not_applied=tuple(changes),
+            )
+        return known
+
+    def _incomplete(
+        self,
+        error: CompaxError,
+        number: int,
+        changes: Mapping[int, tuple[float, float]],
+        applied: Mapping[int, tuple[float, float]],
+    ) -> RestoreIncompleteError:
+        text = self._written(number, changes[number][1])
+        refused = isinstance(error, InvalidCommandError) or _is_refusal_of(text, error)
+        uncertain = {} if refused else {number: changes[number]}
+        left = tuple(each for each in changes if each not in applied and each not in uncertain)
+        lists = f"applied: {self._names(applied)}; not applied: {self._names(left)}"
+        if uncertain:
+            lists += f"; uncertain: {self._names(uncertain)}"
+        waiting = self._waiting((*applied, *uncertain))
+        return RestoreIncompleteError(
+            f"{text} was not restored: {error.what}; {lists}"
+            if refused
+            else f"it is uncertain whether {text} was restored: {error.what}; {lists}",
+            device=self._line.name,
+            sent=error.sent,
+            received=error.received,
+            hint="mend the cause and restore again, or roll_back() what was written"
+            + (f"; not in force before VP: {self._names(waiting)}" if waiting else ""),
+            exchanges=error.exchanges,
+            applied=applied,
+            not_applied=left,
+            uncertain=uncertain,
+        )
+
+    async def _tell(self, number: int, text: str) -> None:  # noqa: ARG002  # the number is for who keeps account
+        await self._line.command(text)
+
+    def _waiting(self, numbers: Iterable[int]) -> tuple[int, ...]:
+        return tuple(number for number in numbers if number not in self._table.live)
 
     # Small things ---------------------------------------------------------------------------------------------------
 
@@ -266,6 +276,9 @@ class NumberedValues:
             return None
         unit = self._line.settings.unit if fact.unit == "axis" else fact.unit
         return f"{fact.meaning} [{unit}]" if unit else fact.meaning
+
+    def _names(self, numbers: Iterable[int]) -> str:
+        return ", ".join(map(self._name, numbers)) or "none"
 
     def _name(self, number: int) -> str:
         if isinstance(number, bool) or not isinstance(number, int) or number not in self._table.decimals:
@@ -303,14 +316,11 @@ class Parameters(NumberedValues):
         """Numbers that were written from here and are not in force before :meth:`make_valid`."""
         return tuple(sorted(self._pending))
 
-    async def write(self, number: int, value: float) -> float:
-        """Write one parameter; see :meth:`NumberedValues.write` and :attr:`pending`."""
-        self._written(number, value)
+    async def _tell(self, number: int, text: str) -> None:
         was_pending = number in self._pending
-        if number not in CONTROL_PARAMETERS:
-            self._pending.add(number)
+        self._pending.update(self._waiting([number]))
         try:
-            return await super().write(number, value)
+            await super()._tell(number, text)
         except CommandRejectedError:
             if not was_pending:
                 self._pending.discard(number)
@@ -356,3 +366,8 @@ class Parameters(NumberedValues):
                 received=f"S17 {status.s17}",
                 hint="another password may be set; ask who commissioned the machine",
             )
+
+
+def _is_refusal_of(text: str, error: CompaxError) -> bool:
+    """Whether the drive refused *text* itself, and not what was asked after it."""
+    return isinstance(error, CommandRejectedError) and error.sent == text

@@ -5,23 +5,49 @@ In step, every answer belongs to the one line that is outstanding. After a time-
 in doubt: a ledger holds what was sent and not answered, oldest first, and a *marker* (a status query whose number no
 other entry bears) is asked until its answer comes. The drive works in order, so that answer proves all before it
 answered, refused or lost. A lone CR would be shorter and is never sent: it executes half a line that may stand in the
-drive's buffer, perhaps a motion.
+drive's buffer, perhaps a motion. A motion in binary has no end sign; where one may have been cut, not even a marker is
+sent, for it could be taken for the rest.
 """
 
 from __future__ import annotations
 
 import re
-from collections import deque
-from collections.abc import Mapping
-from dataclasses import dataclass
-from enum import Enum
-from typing import Final
+from collections.abc import Callable
+from typing import Final, TypeGuard
 
 from ..errors import LinkProtocolError
-from ..link.contract import Event, InStep, LateEnding, MarkerSpent, TurnOver
-from .facts.limits import MAX_PREPARED_POINTS
-from .facts.line import COMMAND_END, POSITION_REACHED_SIGN, PROMPT, XOFF, XON
-from .facts.status import MARKERS
+from ..link.contract import Event, Hold, HoldOver, InStep, LateEnding, MarkerSpent, Stranger, TurnOver
+from .answers import ANSWER, COMPARATOR, COMPARATOR_BEFORE, NOT_TEXT, as_text
+from .binary import encode_ascii, is_motion_frame
+from .facts.line import ERROR_PATTERN, POSITION_REACHED_SIGN, PROMPT
+from .ledger import Ledger, Sent
+from .protocol_events import (
+    Acknowledged,
+    Answered,
+    ComparatorReached,
+    MessageForm,
+    PositionReached,
+    Rejected,
+    Stray,
+    UnexpectedAnswer,
+)
+from .protocol_states import (
+    AHEAD,
+    AWAITING,
+    BUSY,
+    DOUBTFUL,
+    HELD,
+    TRANSITIONS,
+    CommandSent,
+    LineOpened,
+    MarkerSent,
+    MotionFrameSent,
+    Resumed,
+    SentAhead,
+    State,
+    TimeRanOut,
+)
+from .recognition import Recognition
 
 __all__ = [
     "TRANSITIONS",
@@ -40,161 +66,8 @@ __all__ = [
 _MAX_TOKEN: Final = 256
 """Bytes kept while no prompt comes; the longest answer documented has 29 (UG p. 209)."""
 
-_MAX_LEDGER: Final = 16_384
-"""Lines remembered as unanswered: as markers, 64 KiB, which is what a transport takes before it says it is full."""
-
-
-class State(Enum):
-    """Whose turn it is, and whether that is certain."""
-
-    READY = "in step, nothing outstanding"
-    AWAITING_ANSWER = "in step, one line outstanding"
-    IN_DOUBT = "it is unknown what the drive will answer next"
-    AWAITING_MARKER = "in doubt, a marker is outstanding"
-    AWAITING_AHEAD = "in doubt, a line sent ahead is outstanding"
-
-
-class MessageForm(Enum):
-    """What a drive answers to a command that carries ``$``."""
-
-    UNKNOWN = "not seen yet"
-    PROMPT_FIRST = "its prompt at once, and the message at position reached"
-    FINAL_ONLY = "nothing but the message at position reached"
-
-
-@dataclass(frozen=True, slots=True)
-class Acknowledged(TurnOver):
-    """The command was accepted: a bare prompt came (or, *by_message*, its ``$`` did instead)."""
-
-    by_message: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Answered(TurnOver):
-    """The query was answered with *text*, prompt and echo taken off."""
-
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
-class Rejected(TurnOver):
-    """The line was refused with an error number; *text* is all that came."""
-
-    code: int
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
-class UnexpectedAnswer(TurnOver):
-    """A command was answered with *text*, which is neither a prompt nor an error; the line is in doubt."""
-
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
-class PositionReached(Event):
-    """The drive sent ``$`` (UG p. 160)."""
-
-
-@dataclass(frozen=True, slots=True)
-class ComparatorReached(Event):
-    """The drive sent the number of a comparator, counted in the order of programming (UG p. 162)."""
-
-    number: int
-
-
-@dataclass(frozen=True, slots=True)
-class Stray(Event):
-    """Something came that answers nothing outstanding: noise, a doubled or late answer, a text nobody asked for."""
-
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
-class _CommandSent(Event):
-    pass
-
-
-@dataclass(frozen=True, slots=True)
-class _MarkerSent(Event):
-    pass
-
-
-@dataclass(frozen=True, slots=True)
-class _SentAhead(Event):
-    pass
-
-
-@dataclass(frozen=True, slots=True)
-class _TimeRanOut(Event):
-    pass
-
-
-@dataclass(frozen=True, slots=True)
-class _LineOpened(Event):
-    pass
-
-
-TRANSITIONS: Final[Mapping[tuple[State, type[Event]], State]] = {
-    (State.READY, _CommandSent): State.AWAITING_ANSWER,
-    (State.AWAITING_ANSWER, Acknowledged): State.READY,
-    (State.AWAITING_ANSWER, Answered): State.READY,
-    (State.AWAITING_ANSWER, Rejected): State.READY,
-    (State.AWAITING_ANSWER, UnexpectedAnswer): State.IN_DOUBT,
-    (State.AWAITING_ANSWER, _TimeRanOut): State.IN_DOUBT,
-    # Something unasked for in a quiet moment means that turns were miscounted, here or there: find out.
-    (State.READY, Stray): State.IN_DOUBT,
-    (State.AWAITING_ANSWER, Stray): State.AWAITING_ANSWER,
-    (State.IN_DOUBT, Stray): State.IN_DOUBT,
-    (State.AWAITING_MARKER, Stray): State.AWAITING_MARKER,
-    (State.AWAITING_AHEAD, Stray): State.AWAITING_AHEAD,
-    # In doubt: markers, and what may go ahead of them.
-    (State.IN_DOUBT, _MarkerSent): State.AWAITING_MARKER,
-    (State.IN_DOUBT, _SentAhead): State.AWAITING_AHEAD,
-    (State.AWAITING_MARKER, _TimeRanOut): State.IN_DOUBT,
-    (State.AWAITING_AHEAD, _TimeRanOut): State.IN_DOUBT,
-    (State.AWAITING_MARKER, MarkerSpent): State.IN_DOUBT,
-    (State.AWAITING_AHEAD, MarkerSpent): State.IN_DOUBT,
-    (State.IN_DOUBT, LateEnding): State.IN_DOUBT,
-    (State.AWAITING_MARKER, LateEnding): State.AWAITING_MARKER,
-    (State.AWAITING_AHEAD, LateEnding): State.AWAITING_AHEAD,
-    (State.IN_DOUBT, InStep): State.READY,
-    (State.AWAITING_MARKER, InStep): State.READY,
-    (State.AWAITING_AHEAD, InStep): State.READY,
-    # Messages come unasked (UG p. 160, 162); the prompt that ends one frees no command.
-    **{(state, message): state for state in State for message in (PositionReached, ComparatorReached)},
-    **{(state, _LineOpened): State.IN_DOUBT for state in State},
-}
-
-_BUSY: Final = frozenset({State.AWAITING_ANSWER, State.AWAITING_MARKER, State.AWAITING_AHEAD})
-_DOUBTFUL: Final = frozenset({State.IN_DOUBT, State.AWAITING_MARKER, State.AWAITING_AHEAD})
-
-_QUERY: Final = re.compile(r"([SPVN])0*(\d{1,3})")
-_ANSWER: Final = re.compile(r"([SPVN])0*(\d{1,3})(?!\d)\s*[:=]?\s*(.*)", re.DOTALL)
-# "E" and digits anywhere on the line, with or without text around them; the manual's page on it was not available.
-_ERROR: Final = re.compile(r"(?<![A-Z0-9.])E(\d{1,3})(?!\d|\.\d)")
-_COMPARATOR: Final = re.compile(rf"[1-{MAX_PREPARED_POINTS}]")
-# The running text of UG p. 162 prints prompt, then number: such a number stands right before the next answer.
-_COMPARATOR_BEFORE: Final = re.compile(rf"([1-{MAX_PREPARED_POINTS}])\s*(?=[SPVNE$])")
-_NOT_TEXT: Final = bytes({0, XON, XOFF})
-
-
-@dataclass(frozen=True, slots=True)
-class _Sent:
-    """A line that was sent, and what its answer looks like."""
-
-    text: str
-    key: tuple[str, str] | None
-    """Letter and number that a query's answer begins with; None for a command."""
-
-    @classmethod
-    def of(cls, text: str) -> _Sent:
-        query = _QUERY.fullmatch(text.replace(" ", ""))
-        return cls(text, (query[1], query[2]) if query else None)
-
-    @property
-    def wants_message(self) -> bool:
-        return self.text.endswith(POSITION_REACHED_SIGN)
+_STOPS_THAT_FILL_A_FRAME: Final = 2
+"""Half a frame answers nothing, so one answer after a stop shows that there is none; one may have been of no stop."""
 
 
 class CompaxProtocol:
@@ -203,16 +76,28 @@ class CompaxProtocol:
 
     Args:
         message_form: What the drive answers to a command with ``$``, if that is known; else it is learnt.
+        encode: Writes a line as it goes out; :class:`~compax_aio.compax.binary.BinaryTransfer` does it in binary. It
+            counts from the next line on, and whatever goes out, a line is known and told by its text.
+        error_pattern: Finds an error in an answer; its first group is the code.
     """
 
-    def __init__(self, message_form: MessageForm = MessageForm.UNKNOWN) -> None:
+    def __init__(
+        self,
+        message_form: MessageForm = MessageForm.UNKNOWN,
+        encode: Callable[[str], bytes] = encode_ascii,
+        error_pattern: str = ERROR_PATTERN,
+    ) -> None:
         self.state = State.IN_DOUBT
         self.message_form = message_form
-        self._ledger: deque[_Sent] = deque(maxlen=_MAX_LEDGER)
+        self.encode = encode
+        self._error = re.compile(error_pattern)
+        self._ledger = Ledger()
+        self._recognition = Recognition()
+        self._motion_frame = ""
+        self._stops_answered = 0
         self._received = bytearray()
         self._to_send: list[bytes] = []
         self._events: list[Event] = []
-        self._next_marker = 0
         self._number_may_follow = False
         self._flood = ""
 
@@ -221,43 +106,75 @@ class CompaxProtocol:
     @property
     def in_doubt(self) -> bool:
         """Whether it is unknown what the drive will answer next."""
-        return self.state in _DOUBTFUL
+        return self.state in DOUBTFUL
 
     @property
     def is_busy(self) -> bool:
         """Whether a line is outstanding."""
-        return self.state in _BUSY
+        return self.state in BUSY
+
+    @property
+    def held(self) -> Hold | None:
+        """Why nothing but a stop may be sent: a binary motion was not answered, and half of it would wait for more."""
+        if self.state not in HELD:
+            return None
+        return Hold(
+            f"the binary motion {self._motion_frame!r} may have arrived cut, and whatever is sent could complete it to "
+            "a motion somewhere else",
+            "look at the machine: stop() works still, but may be taken for the rest of it at first; when nothing can "
+            "happen, best after the drive was switched off and on (UG p. 167), call reconcile()",
+        )
+
+    def stranger(self, *, time_is_over: bool) -> Stranger | None:
+        """Say which other device is at the far end, as long as no prompt of a COMPAX has ever come."""
+        return self._recognition.stranger(time_is_over=time_is_over)
 
     # What the link does ---------------------------------------------------------------------------------------------
 
     def line_opened(self) -> None:
-        """Take note that the line is new; what stands in the drive's buffer is unknown."""
+        """Take note that the line is new; what stands in the drive's buffer is unknown, or known to be dangerous."""
         self._received.clear()
         self._to_send.clear()
         self._flood = ""
         self._number_may_follow = False
         # Queries of the old line may still be answered, by a device server; a prompt on the new one proves nothing.
-        self._ledger = deque((sent for sent in self._ledger if sent.key), maxlen=_MAX_LEDGER)
-        self._step(_LineOpened())
+        self._ledger.forget_commands()
+        self._recognition.line_opened()
+        self._stops_answered = 0
+        self._step(LineOpened())
 
     def send(self, text: str) -> None:
         """Begin the exchange of *text*, one line without its CR."""
-        self._step(_CommandSent())
-        self._write(text)
+        wire = self.encode(text)
+        if is_motion_frame(wire):
+            self._step(MotionFrameSent())
+            self._motion_frame = text
+            self._stops_answered = 0
+        else:
+            self._step(CommandSent())
+        self._write(text, wire)
 
     def send_marker(self) -> None:
         """Ask a status value whose number tells its answer from every other that may still come."""
-        self._step(_MarkerSent())
-        self._write(self._choose_marker())
+        self._step(MarkerSent())
+        marker = self._ledger.choose_marker()
+        self._write(marker, encode_ascii(marker))
 
     def send_ahead(self, text: str) -> None:
-        """Send *text* although in doubt; whatever comes next ends its turn and proves nothing."""
-        self._step(_SentAhead())
-        self._write(text)
+        """Send *text*, a stop, although in doubt; whatever comes next ends its turn and proves nothing."""
+        self._step(SentAhead())
+        self._write(text, encode_ascii(text))
 
     def time_ran_out(self) -> None:
         """Give the outstanding line up; its answer, should it come, is late."""
-        self._step(_TimeRanOut())
+        self._step(TimeRanOut())
+
+    def resume(self) -> None:
+        """Take a person's word that half a binary motion can do no harm any more; else it does nothing."""
+        if self.state in HELD:
+            self._step(Resumed())
+            # The next prompt may be that of a frame which a marker has completed: it acknowledges no motion.
+            self._ledger.forget_commands()
 
     def bytes_to_send(self) -> bytes:
         """Take what is to be written now."""
@@ -268,8 +185,12 @@ class CompaxProtocol:
     def receive(self, data: bytes) -> None:
         """Read *data*, a piece of any size; see :meth:`events`."""
         # Flow control comes anywhere, in the middle of a prompt too.
-        self._received += data.translate(None, _NOT_TEXT)
+        text = data.translate(None, NOT_TEXT)
+        if self._recognition.received(text) and self.state in BUSY & DOUBTFUL:
+            self._notice(MarkerSpent())
+        self._received += text
         while (end := self._received.find(PROMPT)) >= 0:
+            self._recognition.prompt_came()
             self._read_number_after_prompt()
             end = self._received.find(PROMPT)
             token = bytes(self._received[: min(end, _MAX_TOKEN + 1)])
@@ -297,8 +218,8 @@ class CompaxProtocol:
             self.state = TRANSITIONS[self.state, type(event)]
         except KeyError:
             raise LinkProtocolError(
-                f"{type(event).__name__.lstrip('_')} is not possible while {self.state.value}",
-                sent=self._ledger[-1].text if self._ledger else None,
+                f"{type(event).__name__} is not possible while {self.state.value}",
+                sent=self._ledger.last.text if self._ledger.last else None,
                 hint="wait for the turn to be over",
             ) from None
 
@@ -306,22 +227,23 @@ class CompaxProtocol:
         self._step(event)
         self._events.append(event)
 
-    def _write(self, text: str) -> None:
-        self._ledger.append(_Sent.of(text))
-        self._to_send.append(text.encode("ascii") + COMMAND_END)
+    def _write(self, text: str, wire: bytes) -> None:
+        self._ledger.note(text, wire)
+        self._recognition.sent(wire)
+        self._to_send.append(wire)
 
-    def _choose_marker(self) -> str:
-        unanswered = {sent.key for sent in self._ledger}
-        for _ in MARKERS:
-            number = MARKERS[self._next_marker % len(MARKERS)]
-            self._next_marker += 1
-            if ("S", str(number)) not in unanswered:
-                break
-        return f"S{number}"
+    @property
+    def _outstanding(self) -> Sent | None:
+        """The line whose answer comes next, in step."""
+        return self._ledger.last if self.state in AWAITING else None
+
+    @property
+    def _is_command_outstanding(self) -> bool:
+        return self._outstanding is not None and self._outstanding.key is None
 
     def _end_turn(self, outcome: TurnOver) -> None:
         if not isinstance(outcome, UnexpectedAnswer):
-            self._ledger.clear()
+            self._ledger.settle()
         self._notice(outcome)
 
     # Reading --------------------------------------------------------------------------------------------------------
@@ -330,39 +252,45 @@ class CompaxProtocol:
         """Read the comparator number that may follow a prompt nobody waited for (the running text of UG p. 162)."""
         if self._number_may_follow and self._received:
             self._number_may_follow = False
-            if number := _COMPARATOR.match(self._received[:1].decode("latin-1")):
+            if number := COMPARATOR.match(self._received[:1].decode("latin-1")):
                 del self._received[:1]
                 self._notice(ComparatorReached(int(number[0])))
 
     def _begin_flood(self, data: bytes) -> None:
         """Note that more has come than any answer has; once, until the next prompt."""
         if not self._flood:
-            self._flood = _as_text(data[:_MAX_TOKEN])
+            self._flood = as_text(data[:_MAX_TOKEN])
             self._notice(Stray(self._flood))
 
     def _end_flood(self) -> None:
         """Read the prompt that ends a flood: it acknowledges nothing."""
         text, self._flood = self._flood, ""
-        if self.state is State.AWAITING_ANSWER and self._ledger[-1].key is None:
+        if self._is_command_outstanding:
             self._end_turn(UnexpectedAnswer(text))
 
     def _read_token(self, raw: bytes) -> None:
         """Read what stood before one prompt: usually one line or none, after noise or an echo more."""
-        lines = [line.strip(" \t>") for line in re.split(r"[\r\n]+", _as_text(raw))]
+        lines = [line.strip(" \t>") for line in re.split(r"[\r\n]+", as_text(self._without_frame(raw)))]
         lines = [rest for line in lines if (rest := self._without_echo(line))]
         for line in lines[:-1]:
             self._read_unterminated(line)
         self._read_line(lines[-1] if lines else "")
 
+    def _without_frame(self, raw: bytes) -> bytes:
+        """Take off an echo of the frame that is outstanding; it may hold any byte."""
+        sent = self._ledger.last
+        return raw.removeprefix(sent.wire.translate(None, NOT_TEXT)) if sent is not None and sent.is_frame else raw
+
     def _without_echo(self, line: str) -> str:
         """Take off an echo of the line that is outstanding, with its CR or glued to the answer."""
-        if not self._ledger or not line.startswith((sent := self._ledger[-1]).text):
+        sent = self._ledger.last
+        if sent is None or not line.startswith(sent.text):
             return line
         rest = line[len(sent.text) :].lstrip()
         if sent.key is None:
             return rest if not rest or rest[0] in "SPVNE$" else line
         # "N5 END" is the answer to "N5", with a blank for a colon; "N5N005: END" is an echo and the answer.
-        answer = _ANSWER.fullmatch(rest)
+        answer = ANSWER.fullmatch(rest)
         is_echo = not rest or (answer is not None and (answer[1], answer[2]) == sent.key)
         return rest if is_echo or re.fullmatch(r"E\d{1,3}", line[len(sent.text) :]) else line
 
@@ -371,85 +299,105 @@ class CompaxProtocol:
         self._notice(Stray(line))
 
     def _read_line(self, line: str) -> None:
-        if before := _COMPARATOR_BEFORE.match(line):
+        if before := COMPARATOR_BEFORE.match(line):
             self._notice(ComparatorReached(int(before[1])))
             line = line[before.end() :]
         if line == POSITION_REACHED_SIGN:
             self._read_position_reached()
-        elif _COMPARATOR.fullmatch(line):
+        elif COMPARATOR.fullmatch(line):
             self._notice(ComparatorReached(int(line)))
         elif not line:
             self._read_prompt()
-        elif answer := _ANSWER.fullmatch(line):
+        elif answer := ANSWER.fullmatch(line):
             self._read_answer((answer[1], answer[2]), line)
-        elif error := _ERROR.search(line):
+        elif error := self._error.search(line):
             self._read_error(int(error[1]), line)
-        elif self.state is State.AWAITING_ANSWER and self._ledger[-1].key is None:
+        elif self._is_command_outstanding:
             self._end_turn(UnexpectedAnswer(line))
         else:
             self._notice(Stray(line))
 
     def _read_prompt(self) -> None:
-        commands = [sent for sent in self._ledger if sent.key is None]
-        if self.state is State.AWAITING_ANSWER and commands:
-            if commands[-1].wants_message and self.message_form is MessageForm.UNKNOWN:
+        if self._outstanding is not None and self._outstanding.key is None:
+            if self._outstanding.wants_message and self.message_form is MessageForm.UNKNOWN:
                 self.message_form = MessageForm.PROMPT_FIRST
             self._end_turn(Acknowledged())
-        elif self.state is State.AWAITING_AHEAD:
+        elif self._is_ahead_unanswered:
             # Its own prompt, or a late one of an earlier line; a marker will tell, nothing else can.
-            self._notice(MarkerSpent())
-        elif self.in_doubt and len(commands) == 1:
-            self._end_late(commands[0], Acknowledged())
+            self._notice_ahead_spent()
+        elif self.in_doubt and self._can_be_late(sent := self._ledger.only_command):
+            self._end_late(sent, Acknowledged())
         else:
             self._number_may_follow = True
             self._notice(Stray(""))
 
+    @property
+    def _is_ahead_unanswered(self) -> bool:
+        """Whether a stop is unanswered that went ahead of everything, in its turn or, where it is held, late."""
+        last = self._ledger.last
+        return self.state in AHEAD or (self.state is State.FRAME_IN_DOUBT and last is not None and not last.is_frame)
+
+    def _notice_ahead_spent(self) -> None:
+        """Note that a line sent ahead was answered; two that were have filled up any frame that was cut."""
+        self._notice(MarkerSpent())
+        if self.state in HELD:
+            self._stops_answered += 1
+            if self._stops_answered >= _STOPS_THAT_FILL_A_FRAME:
+                self._notice(HoldOver())
+                # The next prompt may be that of the frame: it acknowledges no motion.
+                self._ledger.forget_commands()
+
+    def _can_be_late(self, sent: Sent | None) -> TypeGuard[Sent]:
+        """Whether an answer without a name that comes while in doubt is that of *sent*, which alone could have it."""
+        if sent is None:
+            return False
+        if sent.is_frame:
+            # What was sent since may have completed a frame that was cut: then it is not what we said that was done.
+            return sent is self._ledger.last
+        return self.state is not State.FRAME_IN_DOUBT
+
     def _read_answer(self, key: tuple[str, str], line: str) -> None:
-        asked = next((sent for sent in self._ledger if sent.key == key), None)
+        asked = self._ledger.asked(key)
         if asked is None:
             self._notice(Stray(line))
-        elif self.state is State.AWAITING_ANSWER:
+        elif asked is self._outstanding:
             self._end_turn(Answered(line))
-        elif self.state is State.AWAITING_MARKER and asked is self._ledger[-1]:
-            self._ledger.clear()
+        elif self.state is State.AWAITING_MARKER and asked is self._ledger.last:
+            self._ledger.settle()
             self._notice(InStep())
         else:
             self._end_late(asked, Answered(line))
 
     def _read_error(self, code: int, line: str) -> None:
-        if self.state is State.AWAITING_ANSWER:
+        only = self._ledger.last if len(self._ledger) == 1 else None
+        if self._outstanding is not None:
             self._end_turn(Rejected(code, line))
-        elif self.state is State.IN_DOUBT and len(self._ledger) == 1:
-            self._end_late(self._ledger[0], Rejected(code, line))
-        elif self.state is State.AWAITING_MARKER and len(self._ledger) == 1:
+        elif self.state in (State.IN_DOUBT, State.FRAME_IN_DOUBT) and self._can_be_late(only):
+            self._end_late(only, Rejected(code, line))
+        elif self.state is State.AWAITING_MARKER and only is not None:
             # Half a line stood in the drive's buffer and has taken ours with it; the buffer is clean now.
-            self._ledger.clear()
+            self._ledger.settle()
             self._notice(MarkerSpent())
-        elif self.state is State.AWAITING_AHEAD:
-            self._notice(MarkerSpent())
+        elif self._is_ahead_unanswered:
+            self._notice_ahead_spent()
         else:
             # Of an earlier line or of the marker: no telling. The marker's answer or its time-out decides.
             self._notice(Stray(line))
 
     def _read_position_reached(self) -> None:
-        waiting = next((sent for sent in self._ledger if sent.wants_message), None)
+        waiting = self._ledger.owed_message()
         if waiting is None or self.message_form is MessageForm.PROMPT_FIRST:
             self._notice(PositionReached())
-        elif self.state is State.AWAITING_ANSWER:
+        elif waiting is self._outstanding:
             self._end_turn(Acknowledged(by_message=True))
             self._notice(PositionReached())
         else:
             self._end_late(waiting, Acknowledged(by_message=True))
             self._notice(PositionReached())
 
-    def _end_late(self, sent: _Sent, outcome: TurnOver) -> None:
+    def _end_late(self, sent: Sent, outcome: TurnOver) -> None:
         """Credit an answer to the oldest line it can belong to; all that is older was lost or refused."""
-        while self._ledger.popleft() is not sent:
-            pass
+        self._ledger.settle_up_to(sent)
         self._notice(LateEnding(sent.text, outcome))
         if not self._ledger:
             self._notice(InStep())
-
-
-def _as_text(raw: bytes) -> str:
-    return raw.translate(None, _NOT_TEXT).decode("latin-1")

@@ -18,40 +18,37 @@ from ..errors import (
     CommandRejectedError,
     CompaxError,
     ConnectionLostError,
-    MoveActiveError,
     MoveInDoubtError,
 )
 from ..link.contract import Lane, TurnOver
-from .facts.line import POSITION_REACHED_SIGN
-from .moves import Move
+from .binary import is_motion_frame
+from .facts.line import EXECUTE_SIGN, POSITION_REACHED_SIGN, STORE_SIGN
+from .memory import Memory
+from .moves import Move, PreparedMove
 from .observer import Look, Observer
+from .pace import Pace
 from .protocol import Acknowledged, MessageForm
 from .reports import Reports
 from .verdict import Verdict, judge
+from .vocabulary import check_travel
 
-__all__ = ["Memory", "Pursuit"]
+__all__ = ["Pursuit"]
 
 _log = logging.getLogger(__name__)
 
 _Value = TypeVar("_Value")
 
-_POLL_GROWTH: Final = 1.5
 _LOOKS_UNTIL_UNCLEAR_COUNTS: Final = 3
 _SAMPLES: Final = 2
 
 
-@dataclass(slots=True)
-class Memory:
-    """What is remembered of a drive from one move to the next."""
+@dataclass(frozen=True, slots=True)
+class _Stored:
+    """A motion in the drive's intermediate memory."""
 
-    messages_owed: int = 0
-    """Commands with ``$`` that were sent, less the ``$`` that came."""
-    points_prepared: int = 0
-    """Speed steps and comparators that the drive holds for a move that was not started."""
-    messages_without_prompt: int = 0
-    """Commands in a row whose ``$`` came without the prompt that others send first."""
-    doubt: str | None = None
-    """Why the drive takes no motion until :meth:`Drive.reconcile`."""
+    lines_sent: int
+    """As the link counted when it was written."""
+    asks_for_message: bool
 
 
 class Pursuit:
@@ -78,6 +75,8 @@ class Pursuit:
         self._was_seen_active = False
         self._homed_before: Look | None = None
         self._reply: asyncio.Future[TurnOver] | None = None
+        self._stored: _Stored | None = None
+        self._sent_as_frame = False
 
     async def carry_out(self) -> None:
         """
@@ -86,8 +85,15 @@ class Pursuit:
         Raises:
             CompaxError: It has not; the error says why.
         """
-        await self._prepare()
-        await self._send()
+        try:
+            if isinstance(self.move, PreparedMove):
+                await self._look_before_preparing()
+            await self._prepare()
+            if isinstance(self.move, PreparedMove):
+                await self._hold_ready(self.move)
+            await self._send()
+        finally:
+            self._line.link.release_reads()
         await self._confirm()
 
     # Saying it ------------------------------------------------------------------------------------------------------
@@ -96,9 +102,12 @@ class Pursuit:
         """Find out where the move begins, as far as it matters, and say everything but the motion itself."""
         plan = self.move.plan
         if plan.distance is not None:
-            self.move.target = round(await self._observer.standing_position() + plan.distance, self._settings.decimals)
+            target = round(await self._observer.standing_position() + plan.distance, self._settings.decimals)
+            self.move.target = check_travel(target, self._settings)
         for text in plan.settings_lines:
-            await self._line.command(text, Lane.MOTION)
+            await self._set(text)
+        await self._line.settle_settings()
+        self._memory.speed_is_unknown &= not plan.sets_speed
         for text in plan.point_lines:
             self._memory.points_prepared += 1
             try:
@@ -106,14 +115,52 @@ class Pursuit:
             except CommandRejectedError:
                 self._memory.points_prepared -= 1
                 raise
+        if plan.finds_machine_zero:
+            await self._look_before_homing()
+
+    async def _set(self, text: str) -> None:
+        try:
+            await self._line.command(text, Lane.MOTION)
+        except AnswerTimeoutError:
+            # Cut in binary it may mean anything; twice as text it does no harm.
+            if not self._line.has_unsure_settings:
+                raise
+
+    async def _hold_ready(self, move: PreparedMove) -> None:
+        """Let the drive store the motion, and wait until it is triggered."""
+        # A drive that keeps quiet about errors may have refused it, and would execute what it had stored before.
+        if self._line.tells_errors:
+            asks = self._asks_for_message and self._settings.message_when_prepared
+            text = move.plan.motion + (POSITION_REACHED_SIGN if asks else "") + STORE_SIGN
+            link = self._line.link
+
+            def on_sent() -> None:
+                self._stored = _Stored(link.lines_sent, asks)
+                link.hold_reads(self._settings.answer_timeout_s)
+
+            await self._line.command(text, Lane.MOTION, on_sent)
+        move.note_ready()
+        await move.triggered.wait()
+
+    @property
+    def _asks_for_message(self) -> bool:
+        return self.move.plan.may_ask_for_message and self._line.protocol.message_form is not MessageForm.FINAL_ONLY
+
+    def _starting_line(self) -> tuple[str, bool]:
+        """Return what starts the motion when it is written now, and whether ``$`` is owed for it."""
+        link = self._line.link
+        if self._stored is not None and self._stored.lines_sent == link.lines_sent and link.is_free:
+            return EXECUTE_SIGN, self._stored.asks_for_message
+        motion = self.move.plan.motion
+        if self._asks_for_message and not is_motion_frame(self._line.protocol.encode(motion)):
+            return motion + POSITION_REACHED_SIGN, True
+        return motion, False  # a frame takes no sign (UG p. 166)
 
     async def _send(self) -> None:
         """Put the motion on the wire, once, and return when it is known to be accepted."""
         plan = self.move.plan
-        if plan.finds_machine_zero:
-            await self._look_before_homing()
-        owes_message = plan.may_ask_for_message and self._line.protocol.message_form is not MessageForm.FINAL_ONLY
-        text = plan.motion + POSITION_REACHED_SIGN if owes_message else plan.motion
+        text, owes_message = self._starting_line()
+        self._sent_as_frame = is_motion_frame(self._line.protocol.encode(text))
 
         def on_sent() -> None:
             self.move.note_sent(text)
@@ -122,6 +169,7 @@ class Pursuit:
             self._owes_message = owes_message
 
         self._reply = self._line.exchange(text, Lane.MOTION, on_sent)
+        self._line.link.release_reads()
         try:
             outcome = await self._reply
         except AnswerTimeoutError as error:
@@ -142,15 +190,20 @@ class Pursuit:
     async def _look_before_homing(self) -> None:
         """Take note of what could be mistaken for its success: machine zero had been approached before."""
         look = await self._observer.look()
-        if look.status.command_active:
-            raise MoveActiveError(
-                "somebody else moves this drive, so home() was not sent",
-                device=self._line.name,
-                received=look.as_sent,
-                hint="wait or stop() first; the drive would answer E92 (UG p. 162, 209)",
-            )
+        self._refuse_if_active(look)
         if look.status.machine_zero_approached:
             self._homed_before = look
+
+    async def _look_before_preparing(self) -> None:
+        """Find out now what would keep the motion from starting when the others start."""
+        look = await self._observer.look()
+        self._refuse_if_active(look)
+        if not look.status.no_fault:
+            raise self._reports.fault(self.move, look, await self._observer.read_error())
+
+    def _refuse_if_active(self, look: Look) -> None:
+        if look.status.command_active:
+            raise self._reports.moved_by_others(self.move, look)
 
     async def _find_out(self, error: CompaxError) -> None:
         """
@@ -160,6 +213,11 @@ class Pursuit:
             The *error* it came with: the status shows that the motion was not taken.
             MoveInDoubtError: The status cannot tell, or is not to be had.
         """
+        if self._sent_as_frame:
+            self._line.give_up_binary(self.move.plan.motion)
+            # Cut, and completed by the bytes of a stop, it may even have become a SPEED.
+            self._memory.speed_is_unknown = True
+            raise self._doubt("it went in binary, and may have arrived cut", error)
         look = await self._look(error)
         status = look.status
         self._was_seen_active |= status.command_active
@@ -221,12 +279,11 @@ class Pursuit:
 
     async def _confirm(self) -> None:
         """Look at the status ever more rarely, and at once when something hints at the end."""
-        interval_s = self._settings.poll_first_s
-        moved_at = self._loop.time()
-        position: float | None = None
+        pace = Pace(self._settings, self._loop.time())
         unclear = 0
         while not self.move.done():
-            await self._pause(interval_s)
+            # Where the drive sends a message there is no hurry to look.
+            await self._pause(pace.pause_s if self._owes_message else pace.pause_before_arrival_s(self.move.target))
             if self.move.done():
                 return
             look = await self._look(None)
@@ -243,11 +300,9 @@ class Pursuit:
                 await self._conclude(look, verdict)
                 return
             unclear = 0
-            if look.position is None or look.position != position:  # where S1 cannot be read, no stall can be seen
-                position, moved_at = look.position, self._loop.time()
-            elif self._loop.time() - moved_at >= self._settings.stall_timeout_s:
+            pace.note(look.position, self._loop.time())
+            if pace.stood_still_s(self._loop.time()) >= self._settings.stall_timeout_s:
                 raise self._reports.stalled(self.move, look, self._settings.stall_timeout_s)
-            interval_s = min(interval_s * _POLL_GROWTH, self._settings.poll_slowest_s)
 
     async def _pause(self, at_most_s: float) -> None:
         try:

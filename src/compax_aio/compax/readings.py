@@ -6,14 +6,27 @@ from typing import Final
 
 from ..errors import InvalidCommandError
 from ..link.contract import Lane
-from .codecs import DriveStatus, HistoryEntry, StatusValue, decode_error, decode_history, decode_status_value
+from .codecs import (
+    DriveStatus,
+    HistoryEntry,
+    MonitorValue,
+    StatusValue,
+    decode_error,
+    decode_history,
+    decode_monitor_value,
+    decode_status_value,
+)
 from .facts.device_errors import DeviceError
+from .facts.quantities import SELECTORS
 from .line import DriveLine
 from .observer import Observer
 
-__all__ = ["Readings"]
+__all__ = ["MAX_STATUS", "Readings"]
 
-_MAX_STATUS: Final = 250
+MAX_STATUS: Final = 250
+
+_FAULT_STATUS: Final = 16
+"""Its first digit is 0 while there is a fault (UG p. 209)."""
 
 
 class Readings:
@@ -60,7 +73,9 @@ class Readings:
 
     async def error(self) -> DeviceError | None:
         """Read the error that is present (S30, IBS p. 12); None if there is none."""
-        return await self._line.read("S30", decode_error)
+        error = await self._line.read("S30", decode_error)
+        self._observer.note_error(error)
+        return error
 
     async def error_history(self) -> tuple[HistoryEntry, ...]:
         """Read the error history (S18, UG p. 209), newest first."""
@@ -73,6 +88,25 @@ class Readings:
         Raises:
             InvalidCommandError: *number* is not a whole number from 1 to 250.
         """
-        if isinstance(number, bool) or not isinstance(number, int) or not 1 <= number <= _MAX_STATUS:
-            raise InvalidCommandError(f"a status has a whole number from 1 to {_MAX_STATUS}, not {number!r}")
-        return await self._line.read(f"S{number}", lambda answer: decode_status_value(number, answer, self.unit))
+        if isinstance(number, bool) or not isinstance(number, int) or not 1 <= number <= MAX_STATUS:
+            raise InvalidCommandError(f"a status has a whole number from 1 to {MAX_STATUS}, not {number!r}")
+        status = await self._line.read(f"S{number}", lambda answer: decode_status_value(number, answer, self.unit))
+        if number == _FAULT_STATUS:
+            await self._observer.note(no_fault=str(status.value).startswith("1"))
+        return status
+
+    async def read_monitor(self, number: int) -> MonitorValue:
+        """
+        Read S13, S14 or S15 with what it shows: first the parameter that chooses it, then the value (UG p. 211).
+
+        A parameter that was written and waits for VP may tell the quantity that is shown only from then on.
+
+        Raises:
+            InvalidCommandError: *number* is not 13, 14 or 15.
+        """
+        if type(number) is not int or number not in SELECTORS:
+            raise InvalidCommandError(f"the quantity of a status can be chosen for S13, S14 and S15, not S{number!r}")
+        chosen = await self._line.query(f"P{SELECTORS[number]}")
+        return await self._line.read(
+            f"S{number}", lambda answer: decode_monitor_value(number, chosen, answer, self.unit)
+        )

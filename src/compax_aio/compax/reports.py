@@ -6,6 +6,7 @@ from ..errors import (
     CompaxError,
     ConnectionLostError,
     DriveFaultError,
+    MoveActiveError,
     MoveInDoubtError,
     MoveStoppedError,
     MoveTimeoutError,
@@ -28,6 +29,10 @@ class Reports:
         """Report a move that was stopped before its motion was sent."""
         return MoveStoppedError(f"{move.plan.description} was stopped before it was sent", device=self._name)
 
+    def taken_back(self, text: str) -> MoveStoppedError:
+        """Report a line that was to start a motion, and that a stop has kept from being sent."""
+        return MoveStoppedError(f"{text!r} was stopped before it was sent", device=self._name)
+
     def unwatched(self, move: Move) -> ConnectionLostError:
         """Report a move that goes on although nobody watches it any more, as was asked for."""
         return ConnectionLostError(
@@ -42,6 +47,15 @@ class Reports:
             sent=move.sent,
             received=look.as_sent,
             hint="command a new move when you want to go on",
+        )
+
+    def moved_by_others(self, move: Move, look: Look) -> MoveActiveError:
+        """Report a move that was not sent because the axis moves already."""
+        return MoveActiveError(
+            f"somebody else moves this drive, so {move.plan.description} was not sent",
+            device=self._name,
+            received=look.as_sent,
+            hint="wait or stop() first; the drive would answer E92 (UG p. 162, 209)",
         )
 
     def stopped_by_others(self, move: Move, look: Look) -> MoveStoppedError:
@@ -89,8 +103,9 @@ class Reports:
     def fault(self, move: Move, look: Look, error: DeviceError | None) -> DriveFaultError:
         """Report a move that a fault has ended."""
         which = f"E{error.code}, {error.meaning}" if error else "the drive does not say which"
+        what = f"a fault {'ended' if move.is_on_wire else 'forbids'} {move.plan.description}"
         return DriveFaultError(
-            f"a fault ended {move.plan.description} at {self._observer.written(look.position)}: {which}",
+            f"{what} at {self._observer.written(look.position)}: {which}",
             device=self._name,
             sent=move.sent,
             received=look.as_sent,

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from math import isfinite
+from pathlib import Path
 from typing import Final
 
 from ..errors import InvalidCommandError
 from .facts.limits import MAX_SPEED_PERCENT, POSITION_DECIMALS, POSITION_DECIMALS_INCH
+from .facts.line import ERROR_PATTERN
 from .plain_line import check_line
 from .protocol import MessageForm
 
@@ -99,6 +102,8 @@ class DriveSettings:
         travel: Lowest and highest position that may be commanded; None: whatever a number can say.
         speed_limit_percent: Speeds above are refused. The drive takes up to 600 (IBS p. 42), few axes do.
         message_form: What the drive answers to a command with ``$``; UNKNOWN lets the first move find out.
+        error_pattern: Regular expression that finds an error in an answer; its one group is the code. The form of error
+            replies stands on no page at hand.
         verify_messages: Ask the status before ``$`` is believed: for drives that send it after a stop or fault too.
         message_when_prepared: Ask for ``$`` also when a move is prepared with ``,``; whether a drive takes both signs
             on one line is not documented.
@@ -122,6 +127,7 @@ class DriveSettings:
     travel: tuple[float, float] | None = None
     speed_limit_percent: float = 100.0
     message_form: MessageForm = MessageForm.UNKNOWN
+    error_pattern: str = ERROR_PATTERN
     verify_messages: bool = False
     message_when_prepared: bool = False
     binary_settings: bool = False
@@ -154,7 +160,41 @@ class DriveSettings:
                 f"speed_limit_percent must be above 0 and at most {MAX_SPEED_PERCENT:g}, "
                 f"not {self.speed_limit_percent!r}"
             )
+        _check_error_pattern(self.error_pattern)
         if type(self.resync_attempts) is not int or self.resync_attempts < 1:
             raise InvalidCommandError(
                 f"resync_attempts must be a whole number and at least 1, not {self.resync_attempts!r}"
             )
+
+    @classmethod
+    def load(cls, path: str | Path) -> DriveSettings:
+        """
+        Read the settings of a drive from a TOML file; what it does not say has its default.
+
+        Raises:
+            InvalidCommandError: It is no TOML, or has a key or value that cannot be meant; says which.
+            OSError: It cannot be read.
+        """
+        from .settings_file import read_settings  # noqa: PLC0415 - which knows this class
+
+        return read_settings(path)
+
+    def save(self, path: str | Path) -> None:
+        """
+        Write all settings to *path* with what they mean; the file is replaced whole, or left as it was.
+
+        Raises:
+            OSError: It cannot be written.
+        """
+        from .settings_file import write_settings  # noqa: PLC0415 - which knows this class
+
+        write_settings(path, self)
+
+
+def _check_error_pattern(pattern: str) -> None:
+    try:
+        groups = re.compile(pattern).groups
+    except (re.error, TypeError) as error:
+        raise InvalidCommandError(f"error_pattern is no regular expression: {error}") from error
+    if groups != 1:
+        raise InvalidCommandError(f"error_pattern has one group, for the code, not {groups}")

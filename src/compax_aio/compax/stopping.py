@@ -14,6 +14,11 @@ __all__ = ["Stop"]
 
 _PAUSE_S: Final = 0.1
 
+_HINT: Final = (
+    "the axis may be moving: use the emergency stop; the RS-232 word for STOP is on no page that was available "
+    "(DriveSettings.dialect), so try it on a bench first"
+)
+
 
 class Stop:
     """
@@ -72,10 +77,8 @@ class Stop:
                     return
             if self._loop.time() >= give_up_at:
                 failure.what = f"STOP was not acknowledged: {failure.what}"
-                failure.hint = (
-                    "the axis may be moving: use the emergency stop; the RS-232 word for STOP is on no page that was "
-                    "available (DriveSettings.dialect), so try it on a bench first"
-                )
+                if self._observer.line.link.held is None:
+                    failure.hint = _HINT
                 raise failure
             await asyncio.sleep(_PAUSE_S)
             self._reply = self._send()

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 from datetime import datetime
 from math import isfinite
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from ..errors import InvalidCommandError
 
-__all__ = ["ValueFile", "read_file", "write_file"]
+__all__ = ["ValueFile", "read_file", "read_toml", "replace_file", "write_file"]
 
 _MAX_BYTES: Final = 256 * 1024
 _KEY: Final = re.compile(r"([PV])(\d{1,3})")
@@ -62,10 +62,20 @@ def write_file(
     for number, value in sorted(values.items()):
         line = f"{letter}{number} = {value:.{decimals[number]}f}"
         lines.append(f"{line:<24}# {comments[number]}" if number in comments else line)
+    replace_file(path, "\n".join(lines) + "\n")
+
+
+def replace_file(path: Path, text: str) -> None:
+    """
+    Write *text* to *path*; a file that is there is replaced at the end, or left as it is.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write("\n".join(lines) + "\n")
+            file.write(text)
             file.flush()
             os.fsync(file.fileno())
         Path(name).replace(path)
@@ -73,6 +83,24 @@ def write_file(
         with suppress(OSError):
             Path(name).unlink()
         raise
+
+
+def read_toml(path: Path, kind: str) -> dict[str, Any]:
+    """
+    Read a file of *kind*, which names it in errors, as TOML.
+
+    Raises:
+        InvalidCommandError: It is too large, or no TOML.
+        OSError: It cannot be read.
+    """
+    with path.open("rb") as file:
+        data = file.read(_MAX_BYTES + 1)
+    if len(data) > _MAX_BYTES:
+        raise InvalidCommandError(f"{path} is larger than any file of {kind}: more than {_MAX_BYTES} bytes")
+    try:
+        return tomllib.loads(data.decode("utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise InvalidCommandError(f"{path} is no TOML: {error}") from error
 
 
 def read_file(path: Path, *, kind: str, letter: str) -> ValueFile:
@@ -83,14 +111,7 @@ def read_file(path: Path, *, kind: str, letter: str) -> ValueFile:
         InvalidCommandError: It is no such file, or holds something that is no such value; says what and where.
         OSError: It cannot be read.
     """
-    with path.open("rb") as file:
-        data = file.read(_MAX_BYTES + 1)
-    if len(data) > _MAX_BYTES:
-        raise InvalidCommandError(f"{path} is larger than any file of {kind}: more than {_MAX_BYTES} bytes")
-    try:
-        content = tomllib.loads(data.decode("utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise InvalidCommandError(f"{path} is no TOML: {error}") from error
+    content = read_toml(path, kind)
     if content.get("kind") != kind or set(content) - {"kind", "drive", "saved_at", kind}:
         raise InvalidCommandError(
             f'{path} is no file of {kind}: it must say kind = "{kind}" and hold a table [{kind}], and nothing else',

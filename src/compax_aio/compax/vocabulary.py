@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from math import isfinite
 from numbers import Real
-from typing import TypeVar
+from typing import TypedDict, TypeVar
 
 from ..errors import InvalidCommandError
 from .facts.limits import (
@@ -17,17 +17,22 @@ from .facts.limits import (
     OUTPUT_NUMBERS,
     SPEED_DECIMALS,
 )
+from .facts.program_commands import MAX_LEVELS
 from .plain_line import check_line
 from .settings import DriveSettings
 
 __all__ = [
     "Comparator",
+    "MoveOptions",
     "MovePlan",
     "SpeedStep",
+    "change_of_speed",
     "check_number",
+    "check_travel",
     "plan_home",
     "plan_move_by",
     "plan_move_to",
+    "setting_of_outputs",
 ]
 
 _Point = TypeVar("_Point")
@@ -59,6 +64,16 @@ class Comparator:
     value: int = 1
 
 
+class MoveOptions(TypedDict, total=False):
+    """What a move may say besides its target; see :meth:`compax_aio.Drive.move_to`."""
+
+    speed_percent: float | None
+    acceleration_ms: int | None
+    deceleration_ms: int | None
+    steps: Iterable[SpeedStep | tuple[float, int]]
+    comparators: Iterable[Comparator | tuple[float, int] | tuple[float, int, int]]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MovePlan:
     """What a move says to the drive, in order, and where it leads."""
@@ -77,6 +92,7 @@ class MovePlan:
     """How many of the points are comparators."""
     motion: str
     """The line that starts the motion, without ``$``."""
+    sets_speed: bool = False
     may_ask_for_message: bool = True
     """Whether ``$`` applies: to POSA and POSR only (UG p. 160)."""
     finds_machine_zero: bool = False
@@ -98,11 +114,12 @@ def plan_move_to(
     Raises:
         InvalidCommandError: A number is not finite, out of range, or cannot be said to this drive.
     """
-    target = _position("position", position, settings)
+    target = check_travel(_position("position", position, settings), settings)
     return MovePlan(
         description=f"move_to({_written(target, settings.decimals)})",
         target=target,
         settings_lines=_settings_lines(settings, speed_percent, acceleration_ms, deceleration_ms),
+        sets_speed=speed_percent is not None,
         point_lines=_point_lines(settings, steps, points := tuple(comparators)),
         comparators=len(points),
         motion=check_line(f"PA{_written(target, settings.decimals)}", room_for_sign=True),
@@ -134,6 +151,7 @@ def plan_move_by(
         description=f"move_by({_written(rounded, settings.decimals)})",
         distance=rounded,
         settings_lines=_settings_lines(settings, speed_percent, acceleration_ms, deceleration_ms),
+        sets_speed=speed_percent is not None,
         point_lines=_point_lines(settings, steps, points := tuple(comparators)),
         comparators=len(points),
         motion=check_line(f"PR{_written(rounded, settings.decimals)}", room_for_sign=True),
@@ -148,6 +166,52 @@ def plan_home(settings: DriveSettings) -> MovePlan:
         may_ask_for_message=False,
         finds_machine_zero=True,
     )
+
+
+def check_travel(target: float, settings: DriveSettings) -> float:
+    """
+    Return *target*, if it lies within the travel that the settings allow.
+
+    Raises:
+        InvalidCommandError: It does not.
+    """
+    if settings.travel is not None and not settings.travel[0] <= target <= settings.travel[1]:
+        low, high = (f"{limit:.{settings.decimals}f}" for limit in settings.travel)
+        raise InvalidCommandError(
+            f"{_written(target, settings.decimals)} {settings.unit} lies outside the travel of the axis, "
+            f"{low} to {high} (P11, P12, UG p. 100)",
+            hint="the limits are those of read_axis() or DriveSettings.travel",
+        )
+    return target
+
+
+def change_of_speed(speed_percent: int, settings: DriveSettings) -> str:
+    """
+    Word another speed for the move that runs.
+
+    Raises:
+        InvalidCommandError: It cannot be said to this drive.
+    """
+    percent = _whole_speed("speed_percent", speed_percent, settings)
+    return check_line(settings.dialect.change_speed.format(percent=percent))
+
+
+def setting_of_outputs(first: int, levels: Sequence[bool | int]) -> str:
+    """
+    Word the setting of one or more outputs in a row (UG p. 95, CAN p. 59).
+
+    Raises:
+        InvalidCommandError: There is no such output, or it is not told 0 or 1.
+    """
+    whole = isinstance(first, int) and not isinstance(first, bool)
+    if not whole or not 1 <= len(levels) <= MAX_LEVELS or {first, first + len(levels) - 1} - set(OUTPUT_NUMBERS):
+        raise InvalidCommandError(
+            f"1 to {MAX_LEVELS} of the outputs 1 to {OUTPUT_NUMBERS[-1]} are set at once, "
+            f"not {len(levels)} from output {first!r} on"
+        )
+    if any(level not in (0, 1) for level in levels):
+        raise InvalidCommandError(f"an output is set to 0 or 1, not to {tuple(levels)!r}")
+    return check_line(f"OT O{first}={''.join(str(int(level)) for level in levels)}")
 
 
 def _settings_lines(
@@ -177,13 +241,8 @@ def _point_lines(
     lines = []
     for each in steps:
         step = each if isinstance(each, SpeedStep) else _of_tuple(SpeedStep, each)
-        speed = check_number("speed_percent of a speed step", step.speed_percent)
-        if speed != int(speed) or not 0 < speed <= settings.speed_limit_percent:
-            raise InvalidCommandError(
-                f"the speed of a speed step is a whole number from 1 to {settings.speed_limit_percent:g} (UG p. 101), "
-                f"not {step.speed_percent!r}"
-            )
-        lines.append(f"PR{_point_distance(step.distance, settings)} SD{int(speed)}")
+        speed = _whole_speed("the speed of a speed step", step.speed_percent, settings)
+        lines.append(f"PR{_point_distance(step.distance, settings)} SD{speed}")
     for item in comparators:
         comparator = item if isinstance(item, Comparator) else _of_tuple(Comparator, item)
         if comparator.output not in OUTPUT_NUMBERS or comparator.value not in (0, 1):
@@ -199,6 +258,16 @@ def _point_lines(
             f"not {len(lines)}"
         )
     return tuple(check_line(line) for line in lines)
+
+
+def _whole_speed(what: str, value: float, settings: DriveSettings) -> int:
+    """Check the speed behind a distance, which has no decimals (UG p. 101)."""
+    speed = check_number(what, value)
+    if speed != int(speed) or not 0 < speed <= settings.speed_limit_percent:
+        raise InvalidCommandError(
+            f"{what} is a whole number from 1 to {settings.speed_limit_percent:g} (UG p. 101), not {value!r}"
+        )
+    return int(speed)
 
 
 def _of_tuple(kind: type[_Point], values: object) -> _Point:

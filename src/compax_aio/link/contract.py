@@ -1,4 +1,4 @@
-"""What a device's line protocol is to the link: four doors, no clock, and events that say whose turn it is."""
+"""What a device's line protocol is to the link: a few doors, no clock, and events that say whose turn it is."""
 
 from __future__ import annotations
 
@@ -6,7 +6,18 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Protocol
 
-__all__ = ["DeviceProtocol", "Event", "InStep", "Lane", "LateEnding", "MarkerSpent", "TurnOver"]
+__all__ = [
+    "DeviceProtocol",
+    "Event",
+    "Hold",
+    "HoldOver",
+    "InStep",
+    "Lane",
+    "LateEnding",
+    "MarkerSpent",
+    "Stranger",
+    "TurnOver",
+]
 
 
 class Lane(IntEnum):
@@ -42,8 +53,29 @@ class MarkerSpent(Event):
 
 
 @dataclass(frozen=True, slots=True)
+class HoldOver(Event):
+    """What the line was held for can do no harm any more, by what was answered; it is still in doubt."""
+
+
+@dataclass(frozen=True, slots=True)
 class InStep(Event):
     """The doubt is over: every earlier line has been answered, refused or lost."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hold:
+    """Why nothing may be sent to get in step, not even a marker, and what a person can do about it."""
+
+    why: str
+    remedy: str
+
+
+@dataclass(frozen=True, slots=True)
+class Stranger:
+    """Another device than the expected: what it looks like, and what a person can do about it."""
+
+    name: str
+    remedy: str
 
 
 class DeviceProtocol(Protocol):
@@ -52,7 +84,7 @@ class DeviceProtocol(Protocol):
 
     The link calls the methods in turns: :meth:`send` when the line is in step and free; after :meth:`time_ran_out`
     or :meth:`line_opened` the line is in doubt, and only :meth:`send_marker` and :meth:`send_ahead` are allowed
-    until an :class:`InStep` event.
+    until an :class:`InStep` event. While it is :attr:`held`, not even :meth:`send_marker` is.
     """
 
     @property
@@ -63,6 +95,10 @@ class DeviceProtocol(Protocol):
     def is_busy(self) -> bool:
         """Whether something is outstanding that must be answered, or given up, before more is sent."""
 
+    @property
+    def held(self) -> Hold | None:
+        """Why nothing but what goes ahead may be sent, until that is answered, or :meth:`resume`; None if it may."""
+
     def line_opened(self) -> None:
         """Take note that the line is new: what stands in the device's buffer is unknown."""
 
@@ -70,13 +106,24 @@ class DeviceProtocol(Protocol):
         """Begin the exchange of *text*; allowed when in step and not busy."""
 
     def send_marker(self) -> None:
-        """Begin the next attempt to get in step; allowed when in doubt and not busy."""
+        """Begin the next attempt to get in step; allowed when in doubt, not held and not busy."""
 
     def send_ahead(self, text: str) -> None:
         """Send *text*, which does no harm when it comes twice, although in doubt; allowed when not busy."""
 
     def time_ran_out(self) -> None:
         """Give the outstanding exchange up: the line is in doubt, and its answer, if it comes, is late."""
+
+    def resume(self) -> None:
+        """Take a person's word that nothing that is sent can do harm now: the line is not held, but still in doubt."""
+
+    def stranger(self, *, time_is_over: bool) -> Stranger | None:
+        """
+        Say which other device is at the far end, by what came before anything that the expected one says.
+
+        Args:
+            time_is_over: The last marker's time has run out; until then only what is certain counts.
+        """
 
     def bytes_to_send(self) -> bytes:
         """Take what is to be written now."""

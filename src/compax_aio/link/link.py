@@ -10,14 +10,17 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from functools import partial
 from typing import cast
 
-from ..errors import AnswerTimeoutError, CompaxError, ConnectionLostError
+from ..errors import CompaxError, ConnectionLostError
 from ..transports.registry import open_transport
-from .contract import DeviceProtocol, Event, InStep, Lane, LateEnding, MarkerSpent, TurnOver
+from .contract import DeviceProtocol, Event, Hold, HoldOver, InStep, Lane, LateEnding, MarkerSpent, TurnOver
+from .deadline import Deadline
+from .exchanges import Exchange, ExchangeQueue
+from .failures import Failures
+from .stats import LinkStats
 from .wire import WireHistory
 
 __all__ = ["Link", "LinkStats"]
@@ -26,48 +29,6 @@ _log = logging.getLogger(__name__)
 
 _CLOSE_GRACE_S = 0.5
 _ABORT_GRACE_S = 1.0
-
-
-@dataclass(slots=True)
-class LinkStats:
-    """Counters of one line since it was made."""
-
-    exchanges: int = 0
-    """Lines answered in their turn."""
-    timeouts: int = 0
-    """Lines whose answer did not come in time."""
-    resynchronisations: int = 0
-    """Times the line was brought back in step, the first after opening included."""
-    late_answers: int = 0
-    """Answers that came after their time had run out, and were recognised."""
-    strays: int = 0
-    """Unsolicited texts, messages of the device not counted."""
-    bytes_sent: int = 0
-    bytes_received: int = 0
-
-
-@dataclass(slots=True, eq=False)
-class _Exchange:
-    """One line to be sent, and who waits for its answer."""
-
-    text: str
-    settles_late: bool
-    on_sent: Callable[[], None] | None
-    waiters: list[asyncio.Future[TurnOver]] = field(default_factory=list)
-
-    @property
-    def is_wanted(self) -> bool:
-        return any(not waiter.done() for waiter in self.waiters)
-
-    def end(self, outcome: TurnOver) -> None:
-        for waiter in self.waiters:
-            if not waiter.done():
-                waiter.set_result(outcome)
-
-    def fail(self, make_error: Callable[[], CompaxError]) -> None:
-        for waiter in self.waiters:
-            if not waiter.done():
-                waiter.set_exception(make_error())
 
 
 class Link(asyncio.Protocol):
@@ -95,28 +56,30 @@ class Link(asyncio.Protocol):
     ) -> None:
         self.stats = LinkStats()
         self.history = WireHistory()
+        self.lines_sent = 0
+        """Everything that was written on this line, markers included; compare it, to see whether the line was used."""
         self._protocol = protocol
         self._name = name
         self._answer_timeout_s = answer_timeout_s
         self._resync_attempts = resync_attempts
+        self._failures = Failures(name, self.history, answer_timeout_s, resync_attempts)
         self._on_event = on_event
         self._on_lost = on_lost
         self._loop = asyncio.get_running_loop()
         self._transport: asyncio.Transport | None = None
         self._closed = self._loop.create_future()
         self._is_closing = False
-        self._lanes: tuple[deque[_Exchange], ...] = tuple(deque() for _ in Lane)
-        self._shared: dict[str, _Exchange] = {}
-        self._outstanding: _Exchange | None = None
-        self._doubtful: _Exchange | None = None
-        self._doubtful_received: str | None = None
+        self._queue = ExchangeQueue()
+        self._reads_timer: asyncio.TimerHandle | None = None
+        self._outstanding: Exchange | None = None
+        self._doubtful: Exchange | None = None
         self._opening: asyncio.Future[None] | None = None
         self._markers_left = 0
         self._is_pursuing = False
         self._may_send_ahead = False
         self._is_reading = False
-        self._deadline = 0.0
-        self._timer: asyncio.TimerHandle | None = None
+        self._deadline = Deadline(answer_timeout_s, self._time_is_up)
+        self._grace: asyncio.TimerHandle | None = None
 
     # Opening and closing --------------------------------------------------------------------------------------------
 
@@ -126,7 +89,8 @@ class Link(asyncio.Protocol):
 
         Raises:
             TransportError: The line cannot be opened.
-            AnswerTimeoutError: Nobody on it answers as this device would.
+            UnexpectedAnswerError: Another device is at its far end.
+            AnswerTimeoutError: Nobody on it answers as this device would, or nothing may be sent (:attr:`held`).
         """
         self._opening = self._loop.create_future()
         try:
@@ -164,6 +128,16 @@ class Link(asyncio.Protocol):
         """Whether there is a line."""
         return self._transport is not None and not self._is_closing
 
+    @property
+    def is_free(self) -> bool:
+        """Whether a line that is queued now would be written at once, unless it is a read that is held back."""
+        return self.is_open and not (self._protocol.is_busy or self._protocol.in_doubt or self._is_reading)
+
+    @property
+    def held(self) -> Hold | None:
+        """Why nothing but a stop may be sent, until one is answered, or :meth:`resume`; None if it may."""
+        return self._protocol.held
+
     # What clients do ------------------------------------------------------------------------------------------------
 
     def exchange(
@@ -180,7 +154,8 @@ class Link(asyncio.Protocol):
         Args:
             text: The line without its end sign; checked by the caller.
             lane: What goes first. Identical lines that wait in ``Lane.READ`` share one exchange.
-            settles_late: After a time-out, wait until the line is in step again, for the answer may come late.
+            settles_late: After a time-out, wait until the line is in step again, for the answer may come late; where
+                nothing may be sent to get in step, only as long as an answer may take, once more.
             on_sent: Called when the line is handed to the transport.
 
         Returns:
@@ -189,19 +164,37 @@ class Link(asyncio.Protocol):
         """
         waiter: asyncio.Future[TurnOver] = self._loop.create_future()
         if not self.is_open:
-            waiter.set_exception(self._lost_error(text))
+            waiter.set_exception(self._lost(Exchange(text)))
             return waiter
-        if lane is Lane.READ:
-            if (shared := self._shared.get(text)) is not None:
-                shared.waiters.append(waiter)
-                return waiter
-            exchange = self._shared[text] = _Exchange(text, settles_late, on_sent, [waiter])
-        else:
-            exchange = _Exchange(text, settles_late, on_sent, [waiter])
-        self._lanes[lane].append(exchange)
+        self._queue.put(Exchange(text, settles_late, on_sent, [waiter]), lane)
         self._ensure_doubt_is_pursued()
         self._pump()
         return waiter
+
+    def hold_reads(self, for_s: float) -> None:
+        """Let what waits in ``Lane.READ`` wait on, at most *for_s* from now; what is on the wire goes on."""
+        self._queue.reads_are_held = True
+        if self._reads_timer is not None:
+            self._reads_timer.cancel()
+        self._reads_timer = self._loop.call_later(for_s, self.release_reads)
+
+    def release_reads(self) -> None:
+        """Let reads go on; harmless when they are not held back."""
+        if self._reads_timer is not None:
+            self._reads_timer.cancel()
+            self._reads_timer = None
+            self._queue.reads_are_held = False
+            self._pump()
+
+    def resume(self) -> None:
+        """Take a person's word that what the line is :attr:`held` for can do no harm, and get in step; else nothing."""
+        if self._protocol.held is None:
+            return
+        self._protocol.resume()
+        self._end_grace()
+        self._fail_doubtful()
+        self._begin_doubt()
+        self._pump()
 
     def recent(self) -> tuple[str, ...]:
         """Return the last exchanges of this line, oldest first, readable."""
@@ -234,23 +227,22 @@ class Link(asyncio.Protocol):
                 self._handle(event)
         finally:
             self._is_reading = False
+        if self._is_pursuing and self._protocol.stranger(time_is_over=False) is not None:
+            self._give_up()
         self._pump()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Fail everything that waits: nobody can say any more what becomes of it."""
         self._transport = None
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
+        self._deadline.cancel()
         if not self._closed.done():
             self._closed.set_result(None)
-        self._markers_left = 0
-        self._is_pursuing = False
-        self._fail_waiting(lambda text: self._lost_error(text, exc))
-        if self._opening is not None and not self._opening.done():
-            self._opening.set_exception(self._lost_error(None, exc))
+        if self._protocol.is_busy:
+            self._protocol.time_ran_out()
+        self.release_reads()
+        self._stop_pursuing(lambda exchange: self._lost(exchange, exc))
         if not self._is_closing:
-            self._on_lost(self._lost_error(None, exc))
+            self._on_lost(self._lost(None, exc))
 
     # Turns ----------------------------------------------------------------------------------------------------------
 
@@ -260,31 +252,23 @@ class Link(asyncio.Protocol):
         while self.is_open and not protocol.is_busy and not self._is_reading:
             if protocol.in_doubt:
                 if not self._pursue_doubt():
-                    self._give_up()
+                    if self._grace is None:
+                        self._give_up()
                     return
-            elif (exchange := self._take_next()) is not None:
+            elif (exchange := self._queue.take_next()) is not None:
                 self._outstanding = exchange
                 protocol.send(exchange.text)
                 self._flush()
-                self._arm()
+                self._deadline.put_off()
                 if exchange.on_sent is not None:
                     exchange.on_sent()
             else:
                 return
 
-    def _take_next(self) -> _Exchange | None:
-        for lane in self._lanes:
-            while lane:
-                exchange = lane.popleft()
-                if lane is self._lanes[Lane.READ]:
-                    del self._shared[exchange.text]
-                if exchange.is_wanted:
-                    return exchange
-        return None
-
     def _flush(self) -> None:
         data = self._protocol.bytes_to_send()
         if data and self._transport is not None:
+            self.lines_sent += 1
             self.stats.bytes_sent += len(data)
             self.history.sent(self._loop.time(), data)
             if _log.isEnabledFor(logging.DEBUG):
@@ -306,6 +290,8 @@ class Link(asyncio.Protocol):
                 self._doubtful.end(event.outcome)
         elif isinstance(event, InStep):
             self._end_doubt()
+        elif isinstance(event, HoldOver):
+            self._begin_doubt()
         elif not isinstance(event, MarkerSpent):
             self._ensure_doubt_is_pursued()
             self._on_event(event)
@@ -323,113 +309,97 @@ class Link(asyncio.Protocol):
 
     def _pursue_doubt(self) -> bool:
         """Send the next thing that helps to get in step; False when there is nothing left to try."""
-        stop = next((exchange for exchange in self._lanes[Lane.STOP] if exchange.is_wanted), None)
-        if stop is not None and self._may_send_ahead and self._markers_left:
+        if not self._markers_left:
+            return False
+        stop = self._queue.first_stop()
+        if self._protocol.held is not None:
+            if stop is None:
+                return False
+            self._markers_left -= 1
+            self._send_ahead(stop)
+        elif stop is not None and self._may_send_ahead:
             # In turn with the markers, for half a line in the device's buffer may spoil either; the exchange itself
             # follows when in step.
             self._may_send_ahead = False
-            self._protocol.send_ahead(stop.text)
-        elif self._markers_left:
+            self._send_ahead(stop)
+        else:
             self._markers_left -= 1
             self._may_send_ahead = True
             self._protocol.send_marker()
-        else:
-            return False
         self._flush()
-        self._arm()
+        self._deadline.put_off()
         return True
+
+    def _send_ahead(self, stop: Exchange) -> None:
+        stop.times_ahead += 1
+        self._protocol.send_ahead(stop.text)
 
     def _end_doubt(self) -> None:
         self.stats.resynchronisations += 1
         self._markers_left = 0
         self._is_pursuing = False
+        self._end_grace()
         self._fail_doubtful()
         if self._opening is not None and not self._opening.done():
             self._opening.set_result(None)
 
     def _give_up(self) -> None:
-        """Tell everyone who waits that nobody answers. What is asked next begins anew."""
+        """Tell everyone who waits why there is no answer. What is asked next begins anew."""
+        if (hold := self._protocol.held) is not None:
+            self._stop_pursuing(partial(self._failures.hold, hold))
+        elif (stranger := self._protocol.stranger(time_is_over=True)) is not None:
+            self._stop_pursuing(partial(self._failures.stranger, stranger))
+        else:
+            self._stop_pursuing(self._failures.silence)
+
+    def _stop_pursuing(self, make_error: Callable[[Exchange | None], CompaxError]) -> None:
+        """Fail everything that waits, the opening too."""
+        self._end_grace()
+        self._markers_left = 0
         self._is_pursuing = False
-        self._fail_waiting(self._silent_error)
+        waiting = self._queue.take_all()
+        waiting += [exchange for exchange in (self._outstanding, self._doubtful) if exchange is not None]
+        self._outstanding = self._doubtful = None
+        for exchange in waiting:
+            exchange.fail(make_error)
         if self._opening is not None and not self._opening.done():
-            self._opening.set_exception(self._silent_error(None))
+            self._opening.set_exception(make_error(None))
 
     def _fail_doubtful(self) -> None:
         if self._doubtful is not None:
             exchange, self._doubtful = self._doubtful, None
-            exchange.fail(lambda: self._timeout_error(exchange.text))
+            hold = self._protocol.held
+            exchange.fail(partial(self._failures.hold, hold) if hold else self._failures.timeout)
+
+    def _lost(self, exchange: Exchange | None, cause: Exception | None = None) -> ConnectionLostError:
+        return self._failures.loss(exchange, cause, is_closing=self._is_closing, hold=self._protocol.held)
 
     # Time -----------------------------------------------------------------------------------------------------------
 
-    def _arm(self) -> None:
-        """Set the deadline; the timer that is already set wakes early at worst, and sets itself anew."""
-        self._deadline = self._loop.time() + self._answer_timeout_s
-        if self._timer is None:
-            self._timer = self._loop.call_at(self._deadline, self._wake)
-
-    def _wake(self) -> None:
-        self._timer = None
+    def _time_is_up(self) -> None:
         if not self._protocol.is_busy:
-            return
-        if self._loop.time() < self._deadline:
-            self._timer = self._loop.call_at(self._deadline, self._wake)
             return
         self._protocol.time_ran_out()
         if self._outstanding is not None:
             self.stats.timeouts += 1
             exchange, self._outstanding = self._outstanding, None
             _log.warning("%s: no answer to %r within %g s", self._name, exchange.text, self._answer_timeout_s)
+            exchange.is_late = True
             self._doubtful = exchange
-            self._doubtful_received = self.history.received_since_sent()
+            exchange.received = self.history.received_since_sent()
             if not exchange.settles_late:
                 self._fail_doubtful()
             self._begin_doubt()
+            if self._protocol.held is not None:
+                self._grace = self._loop.call_later(self._answer_timeout_s, self._grace_is_over)
         self._pump()
 
-    # Errors ---------------------------------------------------------------------------------------------------------
+    def _grace_is_over(self) -> None:
+        """Where nothing may be sent to get in step, a late answer is waited for no longer."""
+        self._end_grace()
+        self._pump()
 
-    def _fail_waiting(self, make_error: Callable[[str], CompaxError]) -> None:
-        waiting = [exchange for lane in self._lanes for exchange in lane]
-        waiting += [exchange for exchange in (self._outstanding, self._doubtful) if exchange is not None]
-        for lane in self._lanes:
-            lane.clear()
-        self._shared.clear()
-        self._outstanding = self._doubtful = None
-        for exchange in waiting:
-            exchange.fail(lambda exchange=exchange: make_error(exchange.text))  # type: ignore[misc]
-
-    def _timeout_error(self, text: str) -> AnswerTimeoutError:
-        return AnswerTimeoutError(
-            f"no answer within {self._answer_timeout_s:g} s",
-            device=self._name,
-            sent=text,
-            received=self._doubtful_received,
-            hint="the line is brought back in step before anything else is sent; an answer that still comes is dropped",
-            exchanges=self.recent(),
-        )
-
-    def _silent_error(self, text: str | None) -> AnswerTimeoutError:
-        received = self.history.received_since_sent()
-        return AnswerTimeoutError(
-            f"no sensible answer to {self._resync_attempts} queries in a row, {self._answer_timeout_s:g} s each",
-            device=self._name,
-            sent=text,
-            received=received,
-            hint=(
-                "what comes is no answer of this device: check baud rate and parity, and which device this is"
-                if received
-                else "check power, cable (crossed, not straight), port and baud rate, and the handshake lines"
-            ),
-            exchanges=self.recent(),
-        )
-
-    def _lost_error(self, text: str | None, cause: Exception | None = None) -> ConnectionLostError:
-        error = ConnectionLostError(
-            "the line is closed" if self._is_closing else "the line was lost" + (f" ({cause})" if cause else ""),
-            device=self._name,
-            sent=text,
-            hint=None if self._is_closing else "a drive that was moving may go on; look at it before you connect again",
-            exchanges=self.recent(),
-        )
-        error.__cause__ = cause
-        return error
+    def _end_grace(self) -> None:
+        if self._grace is not None:
+            self._grace.cancel()
+            self._grace = None

@@ -13,3 +13,4 @@ class Certainty(Enum):
     DOCUMENTED = "a manual says so"
     INFERRED = "deduced from what manuals say"
     PLACEHOLDER = "no source; a value so that something can be sent or simulated"
+    UNKNOWN = "it exists; no page that was available says what it is"

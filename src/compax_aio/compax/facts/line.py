@@ -9,6 +9,7 @@ __all__ = [
     "COMMAND_END",
     "DEFAULT_BAUD_RATE",
     "ECHO_SIGN",
+    "ERROR_PATTERN",
     "EXECUTE_SIGN",
     "MAX_LINE_LENGTH",
     "POSITION_REACHED_SIGN",
@@ -38,6 +39,12 @@ EXECUTE_SIGN: Final = "!"
 
 ECHO_SIGN: Final = "?"
 """The drive sends back what it received (UG p. 160)."""
+
+ERROR_PATTERN: Final = r"(?<![A-Z0-9.])E(\d{1,3})(?!\d|\.\d)"
+"""An error in an answer: ``E`` and digits anywhere on the line, with or without text around them.
+
+The page on it was not available; elsewhere the manual writes codes so (UG p. 209).
+"""
 
 XON: Final = 0x11
 XOFF: Final = 0x13

@@ -90,17 +90,56 @@ PARAMETERS: Final = (
         ParameterFact(number=number, meaning="control parameter for programs", unit=None, source="UG p. 100-101")
         for number in CONTROL_PARAMETERS
     ),
+    *(
+        ParameterFact(number=number, meaning=meaning, unit=None, source="UG p. 124, 211", certainty=Certainty.INFERRED)
+        for number, meaning in (
+            (71, "D/A monitor channel 0: gain or value"),
+            (72, "D/A monitor channel 1: gain or value"),
+            (73, "D/A monitor channel 0: source"),
+            (74, "D/A monitor channel 1: source"),
+        )
+    ),
+    ParameterFact(
+        number=76,
+        meaning="D/A monitor channel 2: source before the point, gain behind it",
+        unit=None,
+        source="UG p. 124, 211",
+    ),
+    ParameterFact(
+        number=77,
+        meaning="D/A monitor channel 3: source before the point, gain behind it",
+        unit=None,
+        source="UG p. 124, 211",
+    ),
     ParameterFact(number=90, meaning="unit of travel; its coding is unknown", unit=None, source="UG p. 100-101"),
-    ParameterFact(number=93, meaning="operating mode", unit=None, source="UG p. 117, 209"),
+    ParameterFact(
+        number=93, meaning="operating mode: 1 to 3 position; one controls speed", unit=None, source="UG p. 117, 209"
+    ),
+    *(
+        ParameterFact(number=number, meaning="process data assignment (Interbus)", unit=None, source="IBS p. 70")
+        for number in range(135, 139)
+    ),
     ParameterFact(number=156, meaning="1000SL: source of inputs 1-6", unit=None, source="UG p. 140"),
     ParameterFact(number=157, meaning="1000SL: source of inputs 7-12", unit=None, source="UG p. 140"),
     ParameterFact(number=158, meaning="1000SL: source of inputs 13-16", unit=None, source="UG p. 140"),
     ParameterFact(number=182, meaning="quantity shown in S15", unit=None, source="UG p. 211"),
-    ParameterFact(number=190, meaning="CAN profile", unit=None, source="CAN-S p. 28"),
-    ParameterFact(number=193, meaning="unasked messages on the bus", unit=None, source="CAN p. 31"),
+    ParameterFact(number=190, meaning="CAN profile: 22 is DSP402", unit=None, source="CAN-S p. 28"),
+    ParameterFact(
+        number=193,
+        meaning="unasked messages on the bus: 1 error, 2 position reached, 4 comparator",
+        unit=None,
+        source="CAN p. 31",
+    ),
     ParameterFact(number=194, meaning="bus address", unit=None, source="485 p. 6"),
     ParameterFact(number=195, meaning="baud rate of the bus", unit=None, source="485 p. 6"),
     ParameterFact(number=196, meaning="mode of the bus", unit=None, source="485 p. 6"),
+    ParameterFact(
+        number=215,
+        meaning="unknown; left out, as P1, by modes 1 and 2 of the cam controller",
+        unit=None,
+        source="UG p. 104",
+        certainty=Certainty.UNKNOWN,
+    ),
     ParameterFact(number=221, meaning="enables bits of the bus control word", unit=None, source="IBS p. 20"),
     ParameterFact(number=227, meaning="bit 4: how output O5 shows position reached", unit=None, source="UG p. 117"),
     ParameterFact(number=233, meaning="quantity shown in S13", unit=None, source="UG p. 211"),

@@ -18,7 +18,7 @@ class Form(Enum):
     BITS = "eight binary digits, bit 1 on the left"
     HISTORY = "eight two-digit codes, newest first"
     PAIR = "one or two numbers"
-    TEXT = "unknown"
+    UNKNOWN = "unknown: a number where it looks like one, else text"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,7 +31,9 @@ class StatusFact:
     """``axis`` is the unit chosen with P90; None where there is none or nobody knows."""
     form: Form
     source: str
+    """Empty where there is none."""
     certainty: Certainty = Certainty.DOCUMENTED
+    """Of meaning and unit together: that of the weaker."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,10 +43,20 @@ class StatusBit:
     bit: int
     name: str
     meaning_when_set: str
+    source: str = "UG p. 209"
+    certainty: Certainty = Certainty.DOCUMENTED
 
 
 def _number(number: int, meaning: str, unit: str | None, source: str, **more: Certainty) -> StatusFact:
     return StatusFact(number=number, meaning=meaning, unit=unit, form=Form.NUMBER, source=source, **more)
+
+
+def _of_unknown_form(number: int, meaning: str, source: str, certainty: Certainty) -> StatusFact:
+    return StatusFact(number=number, meaning=meaning, unit=None, form=Form.UNKNOWN, source=source, certainty=certainty)
+
+
+def _unknown(number: int) -> StatusFact:
+    return _of_unknown_form(number, "unknown", "", Certainty.UNKNOWN)
 
 
 STATUS_VALUES: Final = (
@@ -66,34 +78,25 @@ STATUS_VALUES: Final = (
     StatusFact(number=16, meaning="status bits 1", unit=None, form=Form.BITS, source="UG p. 209"),
     StatusFact(number=17, meaning="status bits 2", unit=None, form=Form.BITS, source="UG p. 209"),
     StatusFact(number=18, meaning="error history", unit=None, form=Form.HISTORY, source="UG p. 209"),
+    *(_unknown(number) for number in range(19, 23)),
     *(
-        StatusFact(
-            number=number,
-            meaning=f"diagnosis value {number - 22}",
-            unit=None,
-            form=Form.TEXT,
-            source="IBS p. 12",
-        )
+        _of_unknown_form(number, f"diagnosis value {number - 22}", "IBS p. 12, CAN p. 69", Certainty.DOCUMENTED)
         for number in range(23, 27)
     ),
+    *(_unknown(number) for number in range(27, 30)),
     StatusFact(number=30, meaning="error message", unit=None, form=Form.PAIR, source="IBS p. 12"),
     *(
-        StatusFact(
-            number=number,
-            meaning=f"device identification {number - 30}",
-            unit=None,
-            form=Form.TEXT,
-            source="IBS p. 12",
-        )
+        _of_unknown_form(number, f"device identification {number - 30}", "IBS p. 12", Certainty.DOCUMENTED)
         for number in range(31, 40)
     ),
 )
+"""All that the object of the status values has (IBS p. 12), those that no page at hand explains too."""
 
 S16_BITS: Final = (
     StatusBit(bit=1, name="no_fault", meaning_when_set="no fault; 0 also until the self-test is done"),
     StatusBit(bit=2, name="no_warning", meaning_when_set="no warning"),
     StatusBit(bit=3, name="machine_zero_approached", meaning_when_set="machine zero has been approached"),
-    StatusBit(bit=4, name="ready_for_start", meaning_when_set="ready for START"),
+    StatusBit(bit=4, name="ready_for_start", meaning_when_set="ready for START", source="UG p. 209, CAN-S p. 28"),
     StatusBit(bit=5, name="position_reached", meaning_when_set="programmed nominal position reached"),
     StatusBit(bit=6, name="idle_after_stop", meaning_when_set="idle after a stop"),
     StatusBit(bit=7, name="output_0_is_1", meaning_when_set="after OUTPUT O0=1"),

@@ -13,7 +13,7 @@ from ..facts.program_commands import ARITHMETIC_SIGNS, COMPARISON_SIGNS, NUMBERS
 from .forms import FORMS_OF, Form
 from .records import Gosub, Goto, Parameter, Record, Status, Variable
 
-__all__ = ["listing", "record_text", "shortest_line", "wire_line", "wire_lines"]
+__all__ = ["listing", "record_text", "short_text", "shortest_line", "wire_line", "wire_lines"]
 
 _LETTERS: Final[dict[type, str]] = {Parameter: "P", Variable: "V", Status: "S"}
 
@@ -40,6 +40,12 @@ def record_text(record: Record) -> str:
     """
     form, values = _form(record)
     return _fill(form.long, form, values)
+
+
+def short_text(record: Record) -> str:
+    """Write one record without its number, abbreviated as in direct mode: ``PR 10 SD 50``; errors as above."""
+    form, values = _form(record)
+    return _fill(form.short, form, values)
 
 
 def wire_line(number: int, record: Record, *, template: str = RECORD_TEMPLATE) -> str:

@@ -1,0 +1,289 @@
+"""One poller a drive: reads each quantity once for all who watch it, and leaves the line to everybody else first."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import re
+from collections.abc import Awaitable, Callable
+from contextlib import suppress
+from copy import copy
+from dataclasses import dataclass
+from functools import partial
+from itertools import count
+from math import floor, inf
+from types import MappingProxyType
+from typing import Any, Final
+from weakref import WeakValueDictionary
+
+from ..errors import CommandRejectedError, CompaxError, ConnectionLostError, InvalidCommandError
+from .line import DriveLine
+from .parameters import NumberedValues
+from .readings import MAX_STATUS, Readings
+from .value_tables import PARAMETER_TABLE, VARIABLE_TABLE
+from .vocabulary import check_number
+from .watch import Reading, Watch
+
+__all__ = ["Poller"]
+
+_log = logging.getLogger(__name__)
+
+_NAMED: Final = (
+    "position",
+    "target",
+    "following_error",
+    "speed",
+    "torque",
+    "status",
+    "error",
+    "error_history",
+)
+"""What can be watched by name: each is the method of the same name of a drive."""
+
+_NUMBERED: Final = re.compile(r"([SPV])([1-9][0-9]{0,2})")
+
+_SHORTEST_INTERVAL_S: Final = 0.001
+_SAME_TIME_S: Final = 1e-6
+"""Clocks and products of fractions are no more exact than that."""
+_PATIENCE: Final = 10
+"""While others use the line, the poller waits so many times as long as its last reading took ..."""
+_LONGEST_PATIENCE_S: Final = 1.0
+"""... or so long, if that is less: watchers are slowed down, but not forgotten."""
+_REFUSED_AGAIN_S: Final = 5.0
+"""What the drive refuses is asked again so rarely: most of it will be refused for ever."""
+
+
+@dataclass(slots=True, eq=False)
+class _Quantity:
+    """One thing that is asked, and what came of it the last time."""
+
+    name: str
+    read: Callable[[], Awaitable[Any]]
+    interval_s: float
+    due_at: float
+    value: Any = None
+    error: CompaxError | None = None
+    at: float = -inf
+
+    @property
+    def is_refused(self) -> bool:
+        return isinstance(self.error, CommandRejectedError)
+
+
+class Poller:
+    """
+    Asks one drive for all who watch it: one task, from the first watch to the last, each quantity once for all.
+
+    It has at most one reading queued, in the lane that goes last, and after each it leaves the line to others for at
+    least as long as that took. So it takes half of an idle line at most, and nobody waits for more than the exchange
+    in flight.
+
+    Args:
+        line: Of the drive.
+        readings: Of the drive; read by name, or by the number of a status value.
+        parameters: Of the drive.
+        variables: Of the drive.
+    """
+
+    def __init__(
+        self, line: DriveLine, readings: Readings, parameters: NumberedValues, variables: NumberedValues
+    ) -> None:
+        self._name = line.name
+        self._stats = line.link.stats
+        self._readings = readings
+        self._parameters = parameters
+        self._variables = variables
+        self._loop = asyncio.get_running_loop()
+        self._watches: WeakValueDictionary[int, Watch] = WeakValueDictionary()
+        self._numbers = count()
+        self._quantities: dict[str, _Quantity] = {}
+        self._task: asyncio.Task[None] | None = None
+        self._is_reading = False
+        self._joined = asyncio.Event()
+        self._is_over = False
+        self._lost: ConnectionLostError | None = None
+
+    # Joining and leaving --------------------------------------------------------------------------------------------
+
+    def watch(self, quantities: tuple[str, ...], interval_s: float) -> Watch:
+        """Let somebody watch from now on; see :meth:`Drive.watch`."""
+        if not quantities:
+            raise InvalidCommandError("nothing was named, so nothing is watched", hint=_possible())
+        if not check_number("interval_s", interval_s) > 0:
+            raise InvalidCommandError(f"interval_s must be above 0, not {interval_s!r}")
+        readers = {name: self._reader(name) for name in quantities}
+        watch = Watch(tuple(readers), max(float(interval_s), _SHORTEST_INTERVAL_S), self._look_after, self._dropped)
+        if self._is_over:
+            watch.end(self._loss())
+            return watch
+        self._watches[next(self._numbers)] = watch
+        for name, read in readers.items():
+            quantity = self._quantities.setdefault(name, _Quantity(name, read, watch.interval_s, watch.due_at))
+            quantity.due_at = min(quantity.due_at, watch.due_at)
+        self._joined.set()
+        if self._task is None:
+            self._task = self._loop.create_task(self._poll(), name=f"{self._name}: watch")
+        return watch
+
+    def lost(self, error: ConnectionLostError) -> None:
+        """Raise *error* in all who watch, and in those to come."""
+        self._lost = error
+        self._end_all()
+
+    def end(self) -> None:
+        """Let all who watch finish, and those to come."""
+        self._lost = None
+        self._end_all()
+
+    def _end_all(self) -> None:
+        self._is_over = True
+        for watch in list(self._watches.values()):
+            watch.end(self._loss())
+        self._look_after()
+
+    def _loss(self) -> ConnectionLostError | None:
+        """Make an error of its own for each consumer: they are raised at different places."""
+        if self._lost is None:
+            return None
+        error = copy(self._lost)
+        error.__cause__ = self._lost.__cause__
+        return error
+
+    def _dropped(self) -> None:
+        # Whichever thread collects garbage; and the event loop may have ended long ago.
+        with suppress(RuntimeError):
+            self._loop.call_soon_threadsafe(self._look_after)
+
+    def _look_after(self) -> None:
+        """End the task if nobody watches any more; a reading that is under way is carried through first."""
+        if self._task is not None and not self._is_reading and not self._is_watched:
+            task, self._task = self._task, None
+            task.cancel()
+
+    @property
+    def _is_watched(self) -> bool:
+        return any(not watch.has_ended for watch in self._watches.values())
+
+    def _reader(self, name: object) -> Callable[[], Awaitable[Any]]:
+        if isinstance(name, str):
+            if name in _NAMED:
+                reader: Callable[[], Awaitable[Any]] = getattr(self._readings, name)
+                return reader
+            if found := _NUMBERED.fullmatch(name):
+                letter, number = found[1], int(found[2])
+                if letter == "S" and number <= MAX_STATUS:
+                    return partial(self._readings.read_status, number)
+                if letter == "P" and number in PARAMETER_TABLE.decimals:
+                    return partial(self._parameters.read, number)
+                if letter == "V" and number in VARIABLE_TABLE.decimals:
+                    return partial(self._variables.read, number)
+        raise InvalidCommandError(f"{name!r} cannot be watched", device=self._name, hint=_possible())
+
+    # Polling --------------------------------------------------------------------------------------------------------
+
+    async def _poll(self) -> None:
+        try:
+            while (quantity := self._next_quantity()) is not None:
+                if quantity.due_at > self._loop.time():
+                    await self._wait_until(quantity.due_at)
+                else:
+                    begun_at = self._loop.time()
+                    await self._read(quantity)
+                    self._serve(quantity)
+                    if self._is_watched:
+                        await self._give_way(self._loop.time() - begun_at)
+        except ConnectionLostError:
+            pass  # the drive tells all who watch, or has done so
+        except BaseException as error:
+            # A defect, or somebody who cancels every task there is: nobody shall wait for ever.
+            if self._task is asyncio.current_task():
+                for watch in list(self._watches.values()):
+                    watch.end(error if isinstance(error, Exception) else None)
+            raise
+        finally:
+            if self._task is asyncio.current_task():
+                self._task = None
+
+    def _next_quantity(self) -> _Quantity | None:
+        """Find what is due first, of what is watched now; it is due as often as the quickest wants it."""
+        intervals: dict[str, float] = {}
+        for watch in list(self._watches.values()):
+            if not watch.has_ended:
+                for name in watch.quantities:
+                    intervals[name] = min(watch.interval_s, intervals.get(name, inf))
+        self._quantities = {name: self._quantities[name] for name in intervals}
+        for name, interval_s in intervals.items():
+            self._quantities[name].interval_s = interval_s
+        return min(self._quantities.values(), key=lambda quantity: quantity.due_at, default=None)
+
+    async def _wait_until(self, due_at: float) -> None:
+        """Wait until *due_at*, or until somebody joins."""
+        self._joined.clear()
+        with suppress(TimeoutError):
+            async with asyncio.timeout_at(due_at):
+                await self._joined.wait()
+
+    async def _read(self, quantity: _Quantity) -> None:
+        error: CompaxError | None = None
+        value = None
+        self._is_reading = True
+        try:
+            value = await quantity.read()
+        except ConnectionLostError:
+            raise
+        except CompaxError as failure:
+            error = failure.with_traceback(None)
+            if quantity.error is None:
+                _log.warning("%s: %s cannot be read: %s", self._name, quantity.name, error)
+        finally:
+            self._is_reading = False
+        quantity.value, quantity.error = value, error
+        quantity.at = self._loop.time()
+        quantity.due_at = _next_beat(quantity.at, quantity.interval_s)
+        if quantity.is_refused:
+            quantity.due_at = max(quantity.due_at, quantity.at + _REFUSED_AGAIN_S)
+
+    def _serve(self, quantity: _Quantity) -> None:
+        """Give a reading to all for whom *quantity* was the last that was missing."""
+        made: dict[tuple[str, ...], Reading] = {}
+        for watch in list(self._watches.values()):
+            if quantity.name in watch.quantities and not watch.has_ended:
+                parts = [self._quantities[name] for name in watch.quantities]
+                times = [part.at for part in parts if not part.is_refused] or [quantity.at]
+                if min(times) >= watch.due_at - _SAME_TIME_S:
+                    if watch.quantities not in made:
+                        made[watch.quantities] = self._reading(parts, min(times))
+                    watch.put(made[watch.quantities])
+                    watch.due_at = _next_beat(max(times), watch.interval_s)
+
+    def _reading(self, parts: list[_Quantity], at: float) -> Reading:
+        values = {part.name: part.value for part in parts if part.error is None}
+        errors = {part.name: part.error for part in parts if part.error is not None}
+        return Reading(self._name, at, MappingProxyType(values), MappingProxyType(errors))
+
+    async def _give_way(self, took_s: float) -> None:
+        """Leave the line to others: for as long as the last reading took, and on while they use it, within patience."""
+        patient_until = self._loop.time() + min(_PATIENCE * took_s, _LONGEST_PATIENCE_S)
+        while True:
+            traffic = self._traffic
+            await asyncio.sleep(took_s)
+            if self._traffic == traffic or self._loop.time() >= patient_until:
+                return
+
+    @property
+    def _traffic(self) -> int:
+        return self._stats.bytes_sent + self._stats.bytes_received
+
+
+def _next_beat(at: float, interval_s: float) -> float:
+    """
+    Return the next whole multiple of *interval_s*, on the loop's clock.
+
+    So all who want something equally often want it at the same time, and the axes of a group are read together.
+    """
+    return (floor((at + _SAME_TIME_S) / interval_s) + 1) * interval_s
+
+
+def _possible() -> str:
+    ranges = f"S1-S{MAX_STATUS}, P1-P{max(PARAMETER_TABLE.decimals)}, V1-V39, V50-V70"
+    return f"possible are {', '.join(_NAMED)}, and by number {ranges}"

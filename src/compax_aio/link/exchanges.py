@@ -1,0 +1,92 @@
+"""What waits for its turn on a line: exchanges in lanes, reads shared and, if need be, held back."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from ..errors import CompaxError
+from .contract import Lane, TurnOver
+
+__all__ = ["Exchange", "ExchangeQueue"]
+
+
+@dataclass(slots=True, eq=False)
+class Exchange:
+    """One line to be sent, and who waits for its answer."""
+
+    text: str
+    settles_late: bool = False
+    """Whether those who wait do so, after a time-out, until the line is in step: the answer may come late."""
+    on_sent: Callable[[], None] | None = None
+    waiters: list[asyncio.Future[TurnOver]] = field(default_factory=list)
+    times_ahead: int = 0
+    """How often it was sent although in doubt."""
+    is_late: bool = False
+    """Whether it was sent in its turn, and its time has run out."""
+    received: str | None = None
+    """What had come until then."""
+
+    @property
+    def is_wanted(self) -> bool:
+        """Whether anybody waits for it."""
+        return any(not waiter.done() for waiter in self.waiters)
+
+    def end(self, outcome: TurnOver) -> None:
+        """Give *outcome* to all who wait."""
+        for waiter in self.waiters:
+            if not waiter.done():
+                waiter.set_result(outcome)
+
+    def fail(self, make_error: Callable[[Exchange], CompaxError]) -> None:
+        """Give an error to each who waits, one of its own."""
+        for waiter in self.waiters:
+            if not waiter.done():
+                waiter.set_exception(make_error(self))
+
+
+class ExchangeQueue:
+    """Lanes, the most urgent first; inside a lane first come, first served."""
+
+    def __init__(self) -> None:
+        self.reads_are_held = False
+        """While set, reads stay where they are; everything else goes on."""
+        self._lanes: tuple[deque[Exchange], ...] = tuple(deque() for _ in Lane)
+        self._reads: dict[str, Exchange] = {}
+
+    def put(self, exchange: Exchange, lane: Lane) -> None:
+        """Queue *exchange*; a read joins another of the same text that waits already."""
+        if lane is Lane.READ:
+            if (shared := self._reads.get(exchange.text)) is not None:
+                shared.waiters += exchange.waiters
+                return
+            self._reads[exchange.text] = exchange
+        self._lanes[lane].append(exchange)
+
+    def take_next(self) -> Exchange | None:
+        """Take out what is to be sent next; what nobody waits for any more is dropped."""
+        for lane in Lane:
+            if lane is Lane.READ and self.reads_are_held:
+                return None
+            waiting = self._lanes[lane]
+            while waiting:
+                exchange = waiting.popleft()
+                if lane is Lane.READ:
+                    del self._reads[exchange.text]
+                if exchange.is_wanted:
+                    return exchange
+        return None
+
+    def first_stop(self) -> Exchange | None:
+        """Find the stop that goes first, and leave it where it is."""
+        return next((exchange for exchange in self._lanes[Lane.STOP] if exchange.is_wanted), None)
+
+    def take_all(self) -> list[Exchange]:
+        """Take out everything, the most urgent first."""
+        waiting = [exchange for lane in self._lanes for exchange in lane]
+        for lane in self._lanes:
+            lane.clear()
+        self._reads.clear()
+        return waiting

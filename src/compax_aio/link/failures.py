@@ -1,0 +1,108 @@
+"""The errors of one line: what did not work, what came instead, and what to do."""
+
+from __future__ import annotations
+
+from ..errors import AnswerTimeoutError, ConnectionLostError, UnexpectedAnswerError
+from .contract import Hold, Stranger
+from .exchanges import Exchange
+from .wire import WireHistory
+
+__all__ = ["Failures"]
+
+
+class Failures:
+    """
+    Makes the errors of one line.
+
+    Args:
+        name: Of the line.
+        history: Its last bytes, told in every error.
+        answer_timeout_s: How long an answer may take.
+        resync_attempts: How many markers are tried.
+    """
+
+    def __init__(self, name: str, history: WireHistory, answer_timeout_s: float, resync_attempts: int) -> None:
+        self._name = name
+        self._history = history
+        self._answer_timeout_s = answer_timeout_s
+        self._resync_attempts = resync_attempts
+
+    def timeout(self, exchange: Exchange) -> AnswerTimeoutError:
+        """Say that one line was not answered in time."""
+        return AnswerTimeoutError(
+            self._not_in_time,
+            device=self._name,
+            sent=exchange.text,
+            received=exchange.received,
+            hint="the line is brought back in step before anything else is sent; an answer that still comes is dropped",
+            exchanges=self._history.lines(),
+        )
+
+    def silence(self, exchange: Exchange | None) -> AnswerTimeoutError:
+        """Say that nobody answers as this device would."""
+        received = self._history.received_since_sent()
+        return AnswerTimeoutError(
+            f"no sensible answer to {self._resync_attempts} queries in a row, {self._answer_timeout_s:g} s each",
+            device=self._name,
+            sent=exchange.text if exchange else None,
+            received=received,
+            hint=(
+                "what comes is no answer of this device: check baud rate and parity, and which device this is"
+                if received
+                else "check power, cable (crossed, not straight), port and baud rate, and the handshake lines"
+            ),
+            exchanges=self._history.lines(),
+        )
+
+    def hold(self, hold: Hold, exchange: Exchange | None) -> AnswerTimeoutError:
+        """Say why nothing may be sent, and what that means for *exchange*."""
+        sent = received = None
+        if exchange is None:
+            what = "nothing was sent"
+        elif exchange.is_late:
+            what, sent, received = self._not_in_time, exchange.text, exchange.received
+        elif exchange.times_ahead:
+            what = f"sent {exchange.times_ahead} times, and nothing shows whether it was understood"
+            sent, received = exchange.text, self._history.received_since_sent()
+        else:
+            what = f"{exchange.text!r} was not sent"
+        return AnswerTimeoutError(
+            f"{what}: {hold.why}",
+            device=self._name,
+            sent=sent,
+            received=received,
+            hint=hold.remedy,
+            exchanges=self._history.lines(),
+        )
+
+    def stranger(self, stranger: Stranger, exchange: Exchange | None) -> UnexpectedAnswerError:
+        """Say that another device is at the far end."""
+        return UnexpectedAnswerError(
+            f"the far end looks like {stranger.name}",
+            device=self._name,
+            sent=exchange.text if exchange else None,
+            received=self._history.received_since_sent(),
+            hint=stranger.remedy,
+            exchanges=self._history.lines(),
+        )
+
+    def loss(
+        self, exchange: Exchange | None, cause: Exception | None, *, is_closing: bool, hold: Hold | None
+    ) -> ConnectionLostError:
+        """Say that the line is gone."""
+        hint = None if is_closing else "a drive that was moving may go on; look at it before you connect again"
+        if hold is not None:
+            hint = f"{hold.why}: look at the machine, and switch the device off and on before you connect again"
+        error = ConnectionLostError(
+            "the line is closed" if is_closing else "the line was lost" + (f" ({cause})" if cause else ""),
+            device=self._name,
+            sent=exchange.text if exchange else None,
+            hint=hint,
+            exchanges=self._history.lines(),
+        )
+        error.__cause__ = cause
+        return error
+
+    @property
+    def _not_in_time(self) -> str:
+        return f"no answer within {self._answer_timeout_s:g} s"

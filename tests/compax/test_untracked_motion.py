@@ -1,0 +1,166 @@
+"""Motions that nobody watches: raw commands and programs are stopped, taken back and told apart from what was sent."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+from tests.promises.bench import bench, ending, is_moving, lines, motions, received
+
+from compax_aio import Drive, MoveActiveError, MoveInDoubtError, MoveStoppedError
+from compax_aio.compax.events import Fault
+from compax_aio.simulator.compax import SimulatedDrive
+
+pytestmark = pytest.mark.usefixtures("nothing_left_behind")
+
+
+async def keep_the_line_busy(drive: Drive, far: SimulatedDrive) -> asyncio.Task[float]:
+    reading = asyncio.ensure_future(drive.torque())
+    await received(far, "S5")
+    return reading
+
+
+@pytest.mark.parametrize("line", ["PA1000", "START"])
+async def test_a_motion_that_waits_for_its_turn_is_taken_back_by_a_stop(line: str) -> None:
+    async with bench() as (drive, far):
+        far.load_program(["POSA 1000", "END"])
+        reading = await keep_the_line_busy(drive, far)
+        telling = asyncio.ensure_future(drive.command(line))
+        await asyncio.sleep(0)
+        await asyncio.sleep(0)
+        await drive.stop()
+        error = await ending(telling)
+        assert isinstance(error, MoveStoppedError)
+        assert "before it was sent" in error.what
+        await reading
+        await asyncio.sleep(10)
+        assert motions(far) == []
+        assert line not in lines(far)
+
+
+async def test_a_motion_that_waits_for_its_turn_is_not_sent_when_the_block_is_left() -> None:
+    async with bench() as (drive, far):
+        reading = await keep_the_line_busy(drive, far)
+        telling = asyncio.ensure_future(drive.command("PA1000"))
+        await asyncio.sleep(0)
+        await asyncio.sleep(0)
+    assert isinstance(await ending(telling), MoveStoppedError)
+    await asyncio.gather(reading, return_exceptions=True)
+    assert motions(far) == []
+
+
+async def test_a_motion_told_during_a_stop_comes_after_it() -> None:
+    async with bench() as (drive, far):
+        await drive.command("PA1000")
+        await asyncio.sleep(1)
+        stopping = asyncio.ensure_future(drive.stop())
+        await asyncio.sleep(0)
+        await drive.command("PA0")
+        assert stopping.done()
+        assert motions(far) == ["POSA 1000.00", "POSA 0.00"]
+        assert lines(far).index("STOP") < lines(far).index("PA0")
+
+
+async def test_cancelling_who_tells_a_motion_before_it_is_written_keeps_it_from_being_sent() -> None:
+    async with bench() as (drive, far):
+        reading = await keep_the_line_busy(drive, far)
+        telling = asyncio.ensure_future(drive.command("PA1000"))
+        await asyncio.sleep(0)
+        await asyncio.sleep(0)
+        telling.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await telling
+        await reading
+        await asyncio.sleep(1)
+        assert motions(far) == []
+        await drive.stop()  # nothing is left to be taken back
+
+
+async def test_leaving_the_block_stops_a_motion_that_nobody_watches() -> None:
+    async with bench() as (drive, far):
+        await drive.command("PA1000")
+        await asyncio.sleep(1)
+        assert is_moving(far)
+    assert not is_moving(far)
+    assert "STOP" in lines(far)
+
+
+async def test_after_a_program_that_has_ended_the_block_is_left_without_a_stop() -> None:
+    async with bench() as (drive, far):
+        far.load_program(["POSA 10", "END"])
+        await drive.program.start(1)
+        await drive.program.wait_finished()
+    assert "STOP" not in lines(far)
+    assert motions(far) == ["POSA 10.00"]
+
+
+async def test_a_stop_between_pointer_and_start_keeps_the_program_from_starting() -> None:
+    async with bench(answer_time_s=0.05) as (drive, far):
+        far.load_program(["POSA 1000", "END"])
+        starting = asyncio.ensure_future(drive.program.start(1))
+        await received(far, "GOTO 1")
+        await drive.stop()
+        assert isinstance(await ending(starting), MoveStoppedError)
+        await asyncio.sleep(5)
+        assert "START" not in lines(far)
+        assert motions(far) == []
+
+
+async def test_a_start_that_is_in_doubt_lets_nothing_move_until_somebody_has_looked() -> None:
+    async with bench() as (drive, far):
+        far.load_program(["POSA 1000", "END"])
+        starting = asyncio.ensure_future(drive.program.start(1))
+        await received(far, "START")
+        far.silent = True
+        assert isinstance(await ending(starting), MoveInDoubtError)
+        with pytest.raises(MoveInDoubtError):
+            drive.move_to(0)
+        far.silent = False
+        await drive.stop()
+        await drive.reconcile()
+        await drive.move_to(0)
+        assert lines(far).count("START") == 1
+
+
+async def test_while_a_move_runs_no_motion_is_told() -> None:
+    async with bench() as (drive, far):
+        move = drive.move_to(1000)
+        await move.accepted
+        with pytest.raises(MoveActiveError):
+            await drive.command("PA0")
+        assert "PA0" not in lines(far)
+        await move.stop()
+        assert isinstance(await ending(move), MoveStoppedError)
+
+
+async def test_a_fault_is_told_even_if_who_noticed_it_first_was_cancelled() -> None:
+    async with bench() as (drive, far):
+        events = drive.events()
+        far.raise_fault(55)
+        looking = asyncio.ensure_future(drive.status())
+        await received(far, "S30")
+        looking.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await looking
+        await drive.status()
+        told = await anext(events)
+        assert isinstance(told, Fault)
+        assert told.error is not None
+        assert told.error.code == 55
+
+
+@pytest.mark.parametrize("how", ["status", "S16", "error"])
+async def test_a_fault_that_any_reading_shows_becomes_one_event(how: str) -> None:
+    async with bench() as (drive, far):
+        events = drive.events()
+        readings = {"status": drive.status, "S16": lambda: drive.read_status(16), "error": drive.error}
+        await readings[how]()
+        far.raise_fault(20)
+        await readings[how]()
+        await readings[how]()
+        await drive.status()
+        told = await anext(events)
+        assert isinstance(told, Fault)
+        assert told.error is not None
+        assert told.error.code == 20
+    assert [event async for event in events] == []
