@@ -122,6 +122,7 @@ class RestoreIncompleteError(CompaxError):
         applied: By number, what the drive had before and what it has now, read back.
         not_applied: Numbers that the drive still has as before: it refused them, or was not told.
         uncertain: By number, what the drive had before and what was sent; what it has now is not known.
+        kind: Of what: ``"parameters"``, ``"variables"`` or ``"program"``.
     """
 
     def __init__(
@@ -131,12 +132,14 @@ class RestoreIncompleteError(CompaxError):
         applied: Mapping[int, tuple[Any, Any]] | None = None,
         not_applied: tuple[int, ...] = (),
         uncertain: Mapping[int, tuple[Any, Any]] | None = None,
+        kind: str = "",
         **more: Any,
     ) -> None:
         super().__init__(what, **more)
         self.applied = dict(applied or {})
         self.not_applied = not_applied
         self.uncertain = dict(uncertain or {})
+        self.kind = kind
 
 
 class LinkProtocolError(CompaxError):

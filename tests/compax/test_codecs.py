@@ -346,3 +346,16 @@ def test_an_unreadable_error_is_not_taken_for_no_error() -> None:
         decode_error("S030: ???")
     with pytest.raises(UnexpectedAnswerError):
         decode_history("S018: ???")
+
+
+@pytest.mark.parametrize("text", ["1,5", "1 234.56", "1.5E3", "1.5e-3", "12.3.4", "5-", "5 -", "3'000", "1 2"])
+def test_a_number_that_would_be_misread_is_refused(text: str) -> None:
+    with pytest.raises(UnexpectedAnswerError, match="no number"):
+        decode_number(f"S001: {text}")
+
+
+@pytest.mark.parametrize(
+    "text", ["12.5", " 12.5 ", "+12.5", "12.5mm", "12.5 mm/s2", "12.5 %", "12.5 E", "= 12.5 mm (actual)"]
+)
+def test_a_unit_or_a_remark_behind_a_number_does_no_harm(text: str) -> None:
+    assert decode_number(f"S001: {text}") == 12.5

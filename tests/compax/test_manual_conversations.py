@@ -13,6 +13,7 @@ from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
+from tests.promises.bench import strangers_order
 
 import compax_aio
 from compax_aio import Drive, DriveSettings
@@ -213,12 +214,13 @@ async def test_the_minimal_conversation() -> None:
 async def test_a_positioning_during_a_move_gets_e92() -> None:
     """UG p. 162, 209: somebody else moves the drive; what we send is refused, and once is enough."""
     async with recorded() as (drive, far, wire):
-        far.receive(b"PA100\r", asyncio.get_running_loop().time())
+        strangers_order(far, "PA100")
+        await asyncio.sleep(0.1)  # in which its prompt comes, and the line is brought in step again
         with pytest.raises(compax_aio.CommandRejectedError) as caught:
-            await drive.move_by(5)
+            await drive.move_to(5)
         assert caught.value.code == 92
-        sent = [data for direction, data in wire.take() if direction == "->" and data.startswith(b"PR")]
-        assert sent == [b"PR5$\r"]
+        sent = [data for direction, data in wire.take() if direction == "->" and data.startswith(b"PA")]
+        assert sent == [b"PA5$\r"]
         await asyncio.sleep(5)
 
 

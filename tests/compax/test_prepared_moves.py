@@ -6,12 +6,13 @@ import asyncio
 from contextlib import suppress
 
 import pytest
-from tests.promises.bench import bench, ending, lines, motions, now, scripted, until
+from tests.promises.bench import bench, ending, lines, motions, now, received, scripted, until
 
 import compax_aio
 from compax_aio import (
     AnswerTimeoutError,
     CommandRejectedError,
+    ConnectionLostError,
     DriveFaultError,
     DriveGroup,
     DriveSettings,
@@ -296,3 +297,49 @@ async def test_a_group_finds_machine_zero_together() -> None:
         assert starts[1] - starts[0] == pytest.approx(0.1 - 0.002, abs=1e-6)  # each drive's own time for a line
         assert lines(far_x)[lines(far_x).index("!") - 1] == "PH,"
         assert drive_named("x").log.texts(LogKind.MOTION_STARTED) == ["POSA HOME 0.00"]
+
+
+# What waits for ever otherwise, or would be told wrongly --------------------------------------------------------------
+
+
+async def test_a_move_that_waits_for_its_trigger_learns_that_the_line_is_lost() -> None:
+    async with bench() as (drive, _):
+        move = drive.prepare_move_to(100)
+        await move.ready
+        drive._line.link._abort()
+        assert isinstance(await ending(move), ConnectionLostError)
+
+
+async def test_a_group_one_of_whose_moves_was_triggered_by_hand_still_starts() -> None:
+    async with bench("x") as (x, far_x), bench("y", answer_time_s=0.1) as (y, far_y):
+        move = DriveGroup(x=x, y=y).move_to(x=100, y=100)
+        await move.moves["x"].ready
+        move.moves["x"].trigger()
+        results = await move
+        assert [result.target for result in results.values()] == [100, 100]
+        assert motions(far_x) == motions(far_y) == ["POSA 100.00"]
+
+
+async def test_an_older_store_that_was_never_triggered_is_not_trusted_to_be_overwritten() -> None:
+    async with bench() as (drive, far):
+        old = drive.prepare_move_to(1000)
+        await old.ready
+        old.cancel()
+        move = drive.prepare_move_to(100)
+        await move.ready
+        move.trigger()
+        await move
+        assert "!" not in lines(far)
+        assert motions(far) == ["POSA 100.00"]
+
+
+async def test_points_of_a_move_that_never_got_its_turn_are_not_counted() -> None:
+    async with bench() as (drive, far):
+        reading = asyncio.ensure_future(drive.torque())
+        await received(far, "S5")
+        move = drive.move_to(100, comparators=[(10, 1)])
+        await asyncio.sleep(0)
+        move.cancel()
+        await reading
+        await drive.move_to(50)
+        assert motions(far) == ["POSA 50.00"]

@@ -3,11 +3,21 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 
 import pytest
-from tests.promises.bench import bench, ending, is_moving, lines, motions, received
+from tests.promises.bench import bench, ending, is_moving, lines, motions, received, scripted
 
-from compax_aio import Drive, MoveActiveError, MoveInDoubtError, MoveStoppedError
+from compax_aio import (
+    CommandRejectedError,
+    Dialect,
+    Drive,
+    DriveSettings,
+    InvalidCommandError,
+    MoveActiveError,
+    MoveInDoubtError,
+    MoveStoppedError,
+)
 from compax_aio.compax.events import Fault
 from compax_aio.simulator.compax import SimulatedDrive
 
@@ -164,3 +174,114 @@ async def test_a_fault_that_any_reading_shows_becomes_one_event(how: str) -> Non
         assert told.error is not None
         assert told.error.code == 20
     assert [event async for event in events] == []
+
+
+async def test_a_stop_takes_back_all_that_wait_not_only_the_last() -> None:
+    async with bench() as (drive, far):
+        reading = await keep_the_line_busy(drive, far)
+        telling = [asyncio.ensure_future(drive.command(line)) for line in ("PA1000", "PA900")]
+        await asyncio.sleep(0)
+        await asyncio.sleep(0)
+        await drive.stop()
+        for each in telling:
+            assert isinstance(await ending(each), MoveStoppedError)
+        await reading
+        assert motions(far) == []
+
+
+async def test_a_motion_told_while_an_older_one_is_waited_for_is_stopped_when_the_block_is_left() -> None:
+    async with bench() as (drive, far):
+        far.load_program(["POSA 10", "END"])
+        await drive.program.start(1)
+        waiting = asyncio.ensure_future(drive.program.wait_finished())
+        await asyncio.sleep(0.3)
+        telling = asyncio.ensure_future(drive.command("PA1000"))
+        await asyncio.gather(waiting, telling, return_exceptions=True)
+    assert not is_moving(far)
+
+
+async def test_a_program_that_waits_is_still_stopped_after_somebody_has_looked() -> None:
+    async with bench() as (drive, far):
+        far.load_program(["WAIT 5000", "POSA 1000", "END"])
+        await drive.program.start(1)
+        await drive.reconcile()
+    await asyncio.sleep(20)
+    assert motions(far) == []
+
+
+async def test_a_motion_nobody_watches_is_stopped_even_if_a_move_behind_it_was_never_sent() -> None:
+    async with bench() as (drive, far):
+        await drive.command("PA1000")
+        reading = await keep_the_line_busy(drive, far)
+        move = drive.move_to(5)
+        await asyncio.sleep(0)
+    assert isinstance(await ending(move), MoveStoppedError)
+    await asyncio.gather(reading, return_exceptions=True)
+    assert not is_moving(far)
+
+
+async def test_another_speed_that_waits_for_its_turn_is_taken_back_by_a_stop() -> None:
+    async with bench() as (drive, far):
+        move = drive.move_to(1000)
+        await move.accepted
+        await asyncio.sleep(1)
+        reading = await keep_the_line_busy(drive, far)
+        changing = asyncio.ensure_future(move.change_speed(30))
+        await asyncio.sleep(0)
+        await asyncio.sleep(0)
+        await drive.stop()
+        assert isinstance(await ending(changing), MoveStoppedError)
+        assert isinstance(await ending(move), MoveStoppedError)
+        await reading
+        assert not any(line.startswith("PR0") for line in lines(far))
+
+
+async def test_words_of_the_dialect_that_start_a_motion_are_motions() -> None:
+    dialect = Dialect(start="RUN", home="HM", single_record="DO {n}")
+    for line in ("RUN", "HM", "DO 7", "do7"):
+        async with scripted(settings=DriveSettings(dialect=dialect)) as (drive, far):
+            await drive.command(line)
+            with pytest.raises(InvalidCommandError):
+                await drive.query(line)
+        assert far.lines.count("STOP") == 1
+
+
+async def _just_wait(accepted: asyncio.Future[None]) -> None:
+    await accepted
+
+
+async def _wait_for(accepted: asyncio.Future[None]) -> None:
+    await asyncio.wait_for(accepted, 5)
+
+
+async def _gather(accepted: asyncio.Future[None]) -> None:
+    await asyncio.gather(accepted)
+
+
+@pytest.mark.parametrize("how", ["before", "after", "wait_for", "gather"])
+async def test_who_awaits_the_acceptance_of_a_refused_move_has_learnt_its_error(
+    how: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    async with scripted({"PA10$": "E90"}) as (drive, _):
+        move = drive.move_to(10)
+        if how == "after":
+            await asyncio.sleep(5)
+        wait = {"wait_for": _wait_for, "gather": _gather}.get(how, _just_wait)
+        with pytest.raises(CommandRejectedError):
+            await wait(move.accepted)
+        del move
+        gc.collect()
+    assert "never retrieved" not in caplog.text
+
+
+async def test_a_move_whose_error_nobody_has_learnt_is_complained_about(caplog: pytest.LogCaptureFixture) -> None:
+    asyncio.get_running_loop().set_exception_handler(None)
+    async with scripted() as (drive, far):
+        move = drive.move_to(10)
+        await move.accepted  # which went well
+        far.answers["S16"] = "S016: 01010000"
+        await asyncio.sleep(5)
+        assert move.done()
+        del move
+        gc.collect()
+    assert "never retrieved" in caplog.text

@@ -36,6 +36,8 @@ __all__ = [
 
 # Blanks may stand anywhere (UG p. 160), between a sign and its number too; digits behind a letter are a name: "E92".
 _NUMBER: Final = re.compile(r"(?<![A-Za-z\d.])([-+]?)\s*(\d+(?:\.\d*)?|\.\d+)")
+# Behind it a unit, or nothing: "1,5", "1 234.56" and "1.5E3" are numbers that would be misread.
+_BEHIND_NUMBER: Final = re.compile(r"(?![eE][-+]?\d)(?:\s*[^\d\s.,'+-]\S*)*\s*")
 _HEAD: Final = re.compile(r"[SPVN]\d+\s*[:=]?|[:=]")
 _BITS: Final = re.compile(r"[01]{8}")
 _WHOLE: Final = re.compile(r"[-+]?\d{1,15}")
@@ -185,9 +187,10 @@ def decode_number(answer: str) -> float:
     Raises:
         UnexpectedAnswerError: There is none.
     """
-    found = _NUMBER.search(value_text(answer))
-    if found is None:
-        raise UnexpectedAnswerError("the answer holds no number", received=answer)
+    text = value_text(answer)
+    found = _NUMBER.search(text)
+    if found is None or not _BEHIND_NUMBER.fullmatch(text, found.end()):
+        raise UnexpectedAnswerError("the answer holds no number that is understood", received=answer)
     return float(found[1] + found[2])
 
 

@@ -78,7 +78,7 @@ class Drive(Readings, AxisCommands):
         await self._line.link.open(url)
         try:
             await self._motion.look_around()
-            await self._line.read_interface()
+            await self._line.transfer.read_interface()
         except BaseException:
             await self._line.link.close()
             raise
@@ -241,10 +241,10 @@ class Drive(Readings, AxisCommands):
             MoveActiveError, MoveInDoubtError: It starts a motion, and a move is running or in doubt; nothing was sent.
             MoveStoppedError: It starts a motion, and a stop came before it was sent.
         """
-        line = check_line(text.upper())
+        line = check_line(text).upper()
         if is_query(line):
             return await self._line.query(line)
-        if starts_motion(line):
+        if starts_motion(line, self.settings.dialect.motions):
             await self._motion.tell(line)
         else:
             await self._line.command(line)
@@ -258,10 +258,10 @@ class Drive(Readings, AxisCommands):
             InvalidCommandError: *text* is not one plain line of at most 30 characters, or starts a motion; nothing
                 was sent.
         """
-        line = check_line(text.upper())
+        line = check_line(text).upper()
         if is_query(line):
             return await self._line.query(line)
-        if starts_motion(line):
+        if starts_motion(line, self.settings.dialect.motions):
             raise InvalidCommandError(f"{text!r} starts a motion, it asks nothing", hint="use move_to() or command()")
         return await self._line.ask_freely(line)
 
@@ -294,8 +294,8 @@ class Drive(Readings, AxisCommands):
 
     @property
     def interface(self) -> SerialInterface | None:
-        """What P20 said at connect about errors, handshake and binary transfer; None where it could not be read."""
-        return self._line.interface
+        """What P20 says of errors, handshake and binary; None where it could not be read, or was written since."""
+        return self._line.transfer.interface
 
     @property
     def stats(self) -> LinkStats:
@@ -357,4 +357,4 @@ class Drive(Readings, AxisCommands):
     def _on_lost(self, error: ConnectionLostError) -> None:
         self._events.publish(ConnectionLost(self.name, self._loop.time(), str(error)))
         self._poller.lost(error)
-        self._motion.line_lost()
+        self._motion.line_lost(error)

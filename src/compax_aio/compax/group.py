@@ -69,13 +69,14 @@ class GroupMove(asyncio.Future[dict[str, MoveResult]]):
 
     async def _start_together(self) -> bool:
         """Let every drive hold its move ready; then send nothing but the triggers, to all lines in one go."""
-        if not await _all_succeed([move.ready for move in self.moves.values()]):
+        if not await _all_succeed([move.readiness for move in self.moves.values()]):
             return False
         if any(move.done() for move in self.moves.values()):  # stopped, or failed, since it was ready
             return False
         for move in self.moves.values():
-            move.trigger()
-        return await _all_succeed([move.accepted for move in self.moves.values()])
+            if not move.triggered.is_set():  # by hand
+                move.trigger()
+        return await _all_succeed([move.acceptance for move in self.moves.values()])
 
     def _report(self) -> None:
         errors = {axis: move.exception() for axis, move in self.moves.items() if not move.cancelled()}

@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import asyncio
-import logging
 from collections.abc import Callable
-from dataclasses import replace
 from typing import TypeVar
 
 from ..errors import AnswerTimeoutError, CommandRejectedError, ConnectionLostError, UnexpectedAnswerError
 from ..link.contract import Event, Lane, TurnOver
 from ..link.link import Link
-from .binary import BinaryTransfer, encode_ascii, is_frame, is_motion_frame
-from .codecs import DriveStatus, SerialInterface, decode_interface, decode_number
+from .codecs import DriveStatus, decode_number
 from .facts.device_errors import device_error
 from .protocol import Acknowledged, Answered, CompaxProtocol, Rejected, UnexpectedAnswer
 from .settings import DriveSettings
+from .transfer import Transfer
 
 __all__ = ["DriveLine"]
-
-_log = logging.getLogger(__name__)
 
 _Value = TypeVar("_Value")
 
@@ -54,59 +50,7 @@ class DriveLine:
             on_lost=on_lost,
         )
         self.last_position: float | None = None
-        self.interface: SerialInterface | None = None
-        self._unsure_settings: list[str] = []
-
-    @property
-    def tells_errors(self) -> bool:
-        """Whether P20 is known to let the drive tell errors; if not, a prompt proves nothing (UG p. 166)."""
-        return self.interface is not None and not self.interface.errors_suppressed
-
-    async def read_interface(self) -> None:
-        """Read P20, and do as it says: believe no prompt of a drive that keeps quiet about errors."""
-        try:
-            interface = self.interface = await self.read("P20", decode_interface, Lane.CONTROL)
-        except (AnswerTimeoutError, CommandRejectedError, UnexpectedAnswerError) as error:
-            _log.warning("%s does not give P20, so whether it tells errors is unknown: %s", self.name, error)
-            return
-        if interface.errors_suppressed:
-            _log.warning(
-                "%s keeps quiet about errors (P20 = %d): a refused command looks like an accepted one; "
-                "moves are confirmed by its status",
-                self.name,
-                interface.raw,
-            )
-            self.settings = replace(self.settings, verify_messages=True)
-        self._choose_transfer(interface)
-
-    def _choose_transfer(self, interface: SerialInterface) -> None:
-        """Use binary transfer, if the settings ask for it and P20 allows it (UG p. 166)."""
-        if self.settings.binary_settings and interface.binary:
-            self.protocol.encode = BinaryTransfer(motion=self.settings.binary_motion).encode
-        elif self.settings.binary_settings:
-            _log.warning("%s takes no binary transfer (P20 = %d), so everything goes as text", self.name, interface.raw)
-        elif interface.binary:
-            _log.warning(
-                "%s has binary transfer on (P20 = %d): a stray byte with its top bit set may swallow what follows it",
-                self.name,
-                interface.raw,
-            )
-
-    def give_up_binary(self, text: str) -> None:
-        """Send text from now on: a line that loses bytes is none for frames, which have no end sign."""
-        _log.warning("%s lost %r or its answer: everything goes as text from now on", self.name, text)
-        self.protocol.encode = encode_ascii
-
-    @property
-    def has_unsure_settings(self) -> bool:
-        """Whether a setting that was sent in binary may have been taken for another one."""
-        return bool(self._unsure_settings)
-
-    async def settle_settings(self) -> None:
-        """Say those settings again, as text, whose frame may have arrived cut: their value could be anything."""
-        while self._unsure_settings:
-            await self.command(self._unsure_settings[0], Lane.MOTION)
-            del self._unsure_settings[0]
+        self.transfer = Transfer(self)
 
     async def query(self, text: str, lane: Lane = Lane.READ) -> str:
         """
@@ -140,17 +84,23 @@ class DriveLine:
             UnexpectedAnswerError: It answered something else; whether it was accepted is unknown.
             AnswerTimeoutError, ConnectionLostError: Whether it was accepted is unknown.
         """
-        sends_frame = is_frame(data := self.protocol.encode(text))
+        wire = self.protocol.encode(text)
+
+        def written() -> None:
+            self.transfer.note_sent(text)
+            if on_sent is not None:
+                on_sent()
+
         try:
-            outcome = await self.exchange(text, lane, on_sent)
+            outcome = await self.exchange(text, lane, written)
         except AnswerTimeoutError:
-            if sends_frame:
-                self.give_up_binary(text)
-                if not is_motion_frame(data):
-                    self._unsure_settings.append(text)
+            self.transfer.note_lost(text, wire)
             raise
         if not isinstance(outcome, Acknowledged):
             raise self.error_of(text, outcome)
+        self.transfer.note_taken(text)
+        if text == self.settings.dialect.make_valid and self.transfer.interface is None:
+            await self.transfer.read_interface()
 
     async def read(self, text: str, decode: Callable[[str], _Value], lane: Lane = Lane.READ) -> _Value:
         """Ask, and decode the answer; an answer that cannot be decoded is told with the drive and its exchanges."""

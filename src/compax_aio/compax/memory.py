@@ -17,7 +17,7 @@ class Memory:
     """Speed steps and comparators that the drive holds for a move that was not started."""
     messages_without_prompt: int = 0
     """Commands in a row whose ``$`` came without the prompt that others send first."""
-    speed_is_unknown: bool = False
-    """Whether the SPEED in force may be one that nobody has said: half a frame may have become it."""
+    stored: int = 0
+    """Motions that were stored with ``,`` and not executed with ``!``: one of them may be in the drive's memory."""
     doubt: str | None = None
     """Why the drive takes no motion until :meth:`Drive.reconcile`."""

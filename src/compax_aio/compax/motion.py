@@ -8,6 +8,7 @@ import logging
 from ..errors import (
     CommandRejectedError,
     CompaxError,
+    ConnectionLostError,
     MoveActiveError,
     MoveError,
     MoveInDoubtError,
@@ -22,6 +23,7 @@ from .observer import Observer
 from .pursuit import Pursuit
 from .reports import Reports
 from .stopping import Stop
+from .untracked import Untracked
 from .vocabulary import MovePlan, change_of_speed
 
 __all__ = ["Motion"]
@@ -39,15 +41,14 @@ class Motion:
 
     def __init__(self, observer: Observer) -> None:
         self.name = observer.line.name
-        self._has_untracked_motion = False
         self._observer = observer
         self._reports = Reports(self.name, observer)
+        self.untracked = Untracked(observer.line, self._reports)
         self._loop = asyncio.get_running_loop()
         self._memory = Memory()
         self._active: Pursuit | None = None
         self._task: asyncio.Task[None] | None = None
         self._stopping: asyncio.Task[None] | None = None
-        self._telling: asyncio.Task[None] | None = None
         self.stops = 0
         """How many times a stop has been asked for."""
         self._timeout_s: float | None = None
@@ -58,7 +59,7 @@ class Motion:
         """Raise what :meth:`start` would raise."""
         self.refuse_second(plan.description)
         self._refuse_in_doubt(plan.description)
-        if self._memory.speed_is_unknown and not plan.sets_speed and not plan.finds_machine_zero:
+        if self._observer.line.transfer.speed_is_unknown and not plan.sets_speed and not plan.finds_machine_zero:
             raise MoveError(
                 f"{plan.description} was not sent: a binary motion was cut, and may have changed the speed in force",
                 device=self.name,
@@ -100,8 +101,9 @@ class Motion:
 
     def trigger(self, move: PreparedMove) -> None:
         """Start *move*, which the drive must hold ready."""
-        if not self._is_active(move) or not move.ready.done() or move.triggered.is_set():
-            why = "it has been triggered or has ended" if move.ready.done() else "the drive does not hold it ready yet"
+        if not self._is_active(move) or not move.readiness.done() or move.triggered.is_set():
+            is_too_late = move.readiness.done()
+            why = "it has been triggered or has ended" if is_too_late else "the drive does not hold it ready yet"
             raise MoveError(
                 f"{move.plan.description} was not triggered: {why}", device=self.name, hint="await move.ready before"
             )
@@ -114,6 +116,11 @@ class Motion:
         self._task = self._loop.create_task(self._pursue(self._active), name=f"{self.name}: {move.plan.description}")
         # Whatever ends the move, by whoever's hand: the drive is free for the next.
         move.add_done_callback(self._move_done)
+        move.acceptance.add_done_callback(self._move_accepted)
+
+    def _move_accepted(self, acceptance: asyncio.Future[None]) -> None:
+        if not acceptance.cancelled() and acceptance.exception() is None:
+            self.untracked.note_moves_over(self.untracked.mark())
 
     def _limit(self, move: Move, timeout_s: float | None) -> None:
         if timeout_s is not None:
@@ -135,7 +142,7 @@ class Motion:
             nonlocal came_late
             came_late = move.done()
 
-        await self._observer.line.command(text, Lane.CONTROL, on_sent)
+        await self.untracked.say(text, Lane.CONTROL, on_sent)
         if came_late:
             # Taken by a drive that stood, it may be a speed step at the beginning of the next move.
             self._memory.points_prepared += 1
@@ -158,7 +165,8 @@ class Motion:
                 self.begin_stop(error)
         except CompaxError as error:
             # What is in doubt may be moving: leaving the block stops it.
-            self._has_untracked_motion |= isinstance(error, MoveInDoubtError) and pursuit.move.is_on_wire
+            if isinstance(error, MoveInDoubtError) and pursuit.move.is_on_wire:
+                self.untracked.note()
             pursuit.move.fail(error)
         except asyncio.CancelledError:
             # Either the move was taken from here, or the event loop is ending: then the drive must not go on alone.
@@ -191,32 +199,12 @@ class Motion:
         self._refuse_in_doubt(repr(text))
         if self.stops != stops:
             raise self._reports.taken_back(text)
-        telling = self._loop.create_task(self._observer.line.command(text, Lane.MOTION, self._note_untracked))
-        self._telling = telling
-        try:
-            await telling
-        except asyncio.CancelledError:
-            task = asyncio.current_task()
-            if self._telling is telling or (task is not None and task.cancelling()):
-                raise
-            raise self._reports.taken_back(text) from None
-        finally:
-            if self._telling is telling:
-                self._telling = None
-
-    def _note_untracked(self) -> None:
-        """Take note that the line which is being told is written."""
-        self._telling = None
-        self._has_untracked_motion = True
-
-    def note_untracked(self, *, ended: bool = False) -> None:
-        """Take note of a motion that nobody watches, so that leaving the block stops it; or of its end."""
-        self._has_untracked_motion = not ended
+        await self.untracked.tell(text)
 
     def note_doubt(self, why: str) -> None:
         """Take no motion from here until :meth:`reconcile`; what may be moving is stopped when the block is left."""
         self._memory.doubt = why
-        self._has_untracked_motion = True
+        self.untracked.note()
 
     def refuse_second(self, what: str) -> None:
         """Raise MoveActiveError if a move runs: *what* was not sent."""
@@ -257,9 +245,14 @@ class Motion:
         if self._active is not None and self._active.move.is_on_wire:
             self._active.move.note_comparator(number)
 
-    def line_lost(self) -> None:
-        """Let whoever watches a move find out at once."""
-        if self._active is not None:
+    def line_lost(self, error: ConnectionLostError) -> None:
+        """Let whoever watches a move find out at once; one that waits for its trigger will never be sent."""
+        if self._active is None:
+            return
+        move = self._active.move
+        if isinstance(move, PreparedMove) and not move.is_on_wire:
+            self._withdraw(move, error)
+        else:
             self._active.look_now()
 
     async def read_position(self) -> float:
@@ -278,9 +271,11 @@ class Motion:
     async def reconcile(self) -> DriveStatus:
         """Read status and position, and end the doubt; a line that is held goes on by the caller's word."""
         self._observer.line.link.resume()
+        mark = self.untracked.mark()
         look = await self._observer.look()
         self._memory.doubt = None
-        self._has_untracked_motion &= look.status.command_active
+        if not look.status.command_active and not look.status.program_running:
+            self.untracked.note_over(mark)
         return look.status
 
     # Stopping -------------------------------------------------------------------------------------------------------
@@ -293,7 +288,7 @@ class Motion:
             reason: What the move that is stopped shall raise, if not MoveStoppedError.
         """
         self.stops += 1
-        self._take_back()
+        self.untracked.take_back()
         pursuit = self._release()
         if pursuit is not None and reason is None:
             # Whoever stops a move from here knows; it is no news that nobody fetched.
@@ -302,7 +297,7 @@ class Motion:
             self._withdraw(pursuit.move, reason or self._reports.withdrawn(pursuit.move))
             pursuit = None
         if self._stopping is None:
-            self._has_untracked_motion = False
+            self.untracked.note_over(self.untracked.mark())
             stop = Stop(self._observer)
             self._stopping = self._loop.create_task(self._stop(stop, pursuit, reason), name=f"{self.name}: stop")
             self._stopping.add_done_callback(self._stop_done)
@@ -314,7 +309,7 @@ class Motion:
             fault = None if look.status.no_fault else await self._observer.read_error()
         except CompaxError as error:
             self._memory.doubt = f"a stop failed ({error.what})"
-            self._has_untracked_motion = True
+            self.untracked.note()
             if pursuit is not None:
                 pursuit.move.fail(self._reports.in_doubt(pursuit.move, "it may still be moving, a stop failed", error))
             raise
@@ -354,28 +349,23 @@ class Motion:
     async def end(self) -> None:
         """Stop what was started here, unless it was to go on; raises what a stop raises."""
         move = self._active.move if self._active is not None else None
-        self._take_back()
+        self.untracked.take_back()
         if move is not None:
             move.add_done_callback(fetch_error)
         if move is not None and not move.is_on_wire:
             self._withdraw(move, self._reports.withdrawn(move))
-        elif move is not None and move.on_cancel == "detach":
+            move = None
+        if move is not None and move.on_cancel == "detach":
             self._withdraw(move, self._reports.unwatched(move))
         elif (hold := self._observer.line.link.held) is not None:
             # Nobody has asked for a stop, and its bytes could complete a motion that never began.
             raise MoveInDoubtError(
                 f"the line was closed without a stop, for {hold.why}", device=self.name, hint=hold.remedy
             )
-        elif move is not None or self._has_untracked_motion:
+        elif move is not None or self.untracked.may_move:
             self.begin_stop()
         if self._stopping is not None:
             await asyncio.shield(self._stopping)
-
-    def _take_back(self) -> None:
-        """Let an untracked motion that still waits for its turn never be sent."""
-        if self._telling is not None:
-            telling, self._telling = self._telling, None
-            telling.cancel()
 
     def _is_active(self, move: Move) -> bool:
         return self._active is not None and self._active.move is move

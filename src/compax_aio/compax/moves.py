@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable, Generator, Iterable
+from contextvars import Context
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol, get_args
+from typing import Any, Literal, Protocol, Self, get_args
 
 from ..errors import CompaxError, InvalidCommandError
 from .vocabulary import MovePlan, check_number
@@ -59,6 +60,25 @@ class MoveOwner(Protocol):
         """Start *move*, which the drive must hold ready."""
 
 
+class _Part(asyncio.Future[None]):
+    """A part of a move that can be awaited by itself: who does has learnt the error that the move ends with."""
+
+    def __init__(self, move: Move) -> None:
+        super().__init__(loop=move.get_loop())
+        self._move = move
+        super().add_done_callback(fetch_error)
+
+    def add_done_callback(self, callback: Callable[[Self], object], /, *, context: Context | None = None) -> None:
+        """Take note that somebody waits."""
+        self._move.is_told_by_part = True
+        super().add_done_callback(callback, context=context)
+
+    def __await__(self) -> Generator[Any, None, None]:
+        if self.done() and not self.cancelled() and self.exception() is not None:
+            fetch_error(self._move)
+        return super().__await__()
+
+
 class Move(asyncio.Future[MoveResult]):
     """
     A motion under way; awaiting it gives a :class:`MoveResult`, or raises why the target was not reached.
@@ -76,14 +96,17 @@ class Move(asyncio.Future[MoveResult]):
 
     def __init__(self, owner: MoveOwner, plan: MovePlan, on_cancel: OnCancel) -> None:
         super().__init__()
-        self.accepted: asyncio.Future[None] = self.get_loop().create_future()
-        # Whoever awaits only the move learns the same error there.
-        self.accepted.add_done_callback(fetch_error)
+        # Whoever awaits only the move learns the same error there, and the other way round.
+        self.accepted: asyncio.Future[None] = _Part(self)
+        self.acceptance: asyncio.Future[None] = self.get_loop().create_future()
+        """The same for the library itself: who gives up waiting for the other does not end this one."""
+        self.acceptance.add_done_callback(fetch_error)
         self.plan = plan
         self.target = plan.target
         self.on_cancel = on_cancel
         self.sent: str | None = None
         self.started_at: float | None = None
+        self.is_told_by_part = False
         self._passed: list[int] = []
         self._owner = owner
         self._changed = asyncio.Event()
@@ -98,7 +121,7 @@ class Move(asyncio.Future[MoveResult]):
         """Give the move up; STOP is written before this returns, if the line is free and the drive may be moving."""
         if not super().cancel(msg):
             return False
-        self.accepted.cancel(msg)
+        _end((self.accepted, self.acceptance))
         self._owner.abandon(self)
         return True
 
@@ -181,8 +204,7 @@ class Move(asyncio.Future[MoveResult]):
 
     def note_accepted(self) -> None:
         """Note that the prompt came back."""
-        if not self.accepted.done():
-            self.accepted.set_result(None)
+        _succeed((self.accepted, self.acceptance))
 
     def note_comparator(self, number: int) -> None:
         """Note that comparator *number* was passed."""
@@ -208,8 +230,9 @@ class Move(asyncio.Future[MoveResult]):
 
     def fail(self, error: CompaxError) -> None:
         """Raise *error* in whoever awaits the move, or its acceptance."""
-        if not self.accepted.done():
-            self.accepted.set_exception(error)
+        if self.is_told_by_part and not self.accepted.done():
+            self.add_done_callback(fetch_error)
+        _fail((self.accepted, self.acceptance), error)
         if not self.done():
             self.set_exception(error)
 
@@ -227,8 +250,10 @@ class PreparedMove(Move):
 
     def __init__(self, owner: MoveOwner, plan: MovePlan, on_cancel: OnCancel) -> None:
         super().__init__(owner, plan, on_cancel)
-        self.ready: asyncio.Future[None] = self.get_loop().create_future()
-        self.ready.add_done_callback(fetch_error)
+        self.ready: asyncio.Future[None] = _Part(self)
+        self.readiness: asyncio.Future[None] = self.get_loop().create_future()
+        """The same for the library itself."""
+        self.readiness.add_done_callback(fetch_error)
         self.triggered = asyncio.Event()
 
     def trigger(self) -> None:
@@ -245,19 +270,34 @@ class PreparedMove(Move):
 
     def cancel(self, msg: Any = None) -> bool:
         """Give the move up; see :meth:`Move.cancel`."""
-        self.ready.cancel(msg)
+        _end((self.ready, self.readiness))
         return super().cancel(msg)
 
     def note_ready(self) -> None:
         """Note that the drive holds the move."""
-        if not self.ready.done():
-            self.ready.set_result(None)
+        _succeed((self.ready, self.readiness))
 
     def fail(self, error: CompaxError) -> None:
         """Raise *error* in whoever awaits the move, its readiness, or its acceptance."""
-        if not self.ready.done():
-            self.ready.set_exception(error)
+        _fail((self.ready, self.readiness), error)
         super().fail(error)
+
+
+def _succeed(futures: Iterable[asyncio.Future[None]]) -> None:
+    for future in futures:
+        if not future.done():
+            future.set_result(None)
+
+
+def _fail(futures: Iterable[asyncio.Future[None]], error: CompaxError) -> None:
+    for future in futures:
+        if not future.done():
+            future.set_exception(error)
+
+
+def _end(futures: Iterable[asyncio.Future[None]]) -> None:
+    for future in futures:
+        future.cancel()
 
 
 def check_manner(timeout_s: float | None, on_cancel: OnCancel) -> None:

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from typing import Final
 
 from ..errors import InvalidCommandError
 from .facts.line import ECHO_SIGN, EXECUTE_SIGN, MAX_LINE_LENGTH, POSITION_REACHED_SIGN, STORE_SIGN
 
-__all__ = ["check_line", "is_query", "starts_motion"]
+__all__ = ["check_line", "is_positioning", "is_query", "starts_motion"]
 
 _SIGNS: Final = frozenset({POSITION_REACHED_SIGN, STORE_SIGN, EXECUTE_SIGN, ECHO_SIGN, ">"})
 _QUERY: Final = re.compile(r"[SPVN]\d{1,3}")
 _MOTION: Final = re.compile(r"POS[AR]|P[AHR]|LOOP|START|WAITPOS[AR]")
+_POSITIONING: Final = re.compile(r"POS[AR]|P[AHR]")
 _PREPARED_POINT: Final = re.compile(r"(POSR|PR).*(SPEED|SD|OUTPUT|OT)")
 
 
@@ -24,6 +26,8 @@ def check_line(text: str, *, room_for_sign: bool = False) -> str:
         InvalidCommandError: It is empty, longer than the entry buffer (30 characters, UG p. 160), not printable
             ASCII, or holds a character that carries meaning: CR, LF, ``$ ? ! , >``.
     """
+    if not isinstance(text, str):
+        raise InvalidCommandError(f"a line is a text, not {text!r}")
     line = text.strip(" ")
     for character in line:
         if character in _SIGNS:
@@ -40,7 +44,9 @@ def check_line(text: str, *, room_for_sign: bool = False) -> str:
     if not line or len(line) > longest:
         raise InvalidCommandError(
             f"{text!r} has {len(line)} characters; the drive's entry buffer takes 1 to {longest} (UG p. 160)",
-            hint="use the short forms of the commands (PA, PR, SD, AL, OT) and leave out blanks",
+            hint="use the short forms of the commands (PA, PR, SD, AL, OT) and leave out blanks"
+            if line
+            else "an empty line is never sent: its CR executes what stands in the drive's buffer",
         )
     return line
 
@@ -50,10 +56,24 @@ def is_query(line: str) -> bool:
     return _QUERY.fullmatch(_compact(line)) is not None
 
 
-def starts_motion(line: str) -> bool:
-    """Whether *line* sets the axis in motion (UG p. 162), or the program that may; prepared points do not."""
+def starts_motion(line: str, words: Iterable[str] = ()) -> bool:
+    """
+    Whether *line* sets the axis in motion (UG p. 162), or the program that may; prepared points do not.
+
+    Args:
+        line: As it is sent.
+        words: What else does so on this drive, by its dialect; what stands behind ``{`` is not compared.
+    """
     compact = _compact(line)
+    if any(compact.startswith(_compact(word.partition("{")[0])) for word in words):
+        return True
     return _MOTION.match(compact) is not None and not _PREPARED_POINT.match(compact)
+
+
+def is_positioning(line: str) -> bool:
+    """Whether *line* is a motion that ends before the drive takes another one: not a program (UG p. 162)."""
+    compact = _compact(line)
+    return _POSITIONING.match(compact) is not None and not _PREPARED_POINT.match(compact)
 
 
 def _compact(line: str) -> str:

@@ -112,11 +112,13 @@ class Poller:
         if not check_number("interval_s", interval_s) > 0:
             raise InvalidCommandError(f"interval_s must be above 0, not {interval_s!r}")
         readers = {name: self._reader(name) for name in quantities}
-        watch = Watch(tuple(readers), max(float(interval_s), _SHORTEST_INTERVAL_S), self._look_after, self._dropped)
+        number = next(self._numbers)
+        leave = partial(self._leave, number)
+        watch = Watch(tuple(readers), max(float(interval_s), _SHORTEST_INTERVAL_S), leave, self._dropped)
         if self._is_over:
             watch.end(self._loss())
             return watch
-        self._watches[next(self._numbers)] = watch
+        self._watches[number] = watch
         for name, read in readers.items():
             quantity = self._quantities.setdefault(name, _Quantity(name, read, watch.interval_s, watch.due_at))
             quantity.due_at = min(quantity.due_at, watch.due_at)
@@ -148,6 +150,11 @@ class Poller:
         error = copy(self._lost)
         error.__cause__ = self._lost.__cause__
         return error
+
+    def _leave(self, number: int) -> None:
+        # Kept, those who have left would be looked through each time that one more leaves.
+        self._watches.pop(number, None)
+        self._look_after()
 
     def _dropped(self) -> None:
         # Whichever thread collects garbage; and the event loop may have ended long ago.

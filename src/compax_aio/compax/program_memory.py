@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from decimal import Decimal
-from functools import partial
 from pathlib import Path
+from typing import Final
 
 from ..errors import (
     AnswerTimeoutError,
@@ -21,8 +21,9 @@ from ..errors import (
 )
 from .codecs import value_text
 from .facts.program_commands import RECORD_NUMBERS, RECORD_TEMPLATE
+from .half_done import HalfDone, RollBack
 from .listing_source import ListingSource, load_listing
-from .parameters import Progress
+from .numbered_values import Progress
 from .program import check, listing, parse, parse_record, raise_for_errors, record_text, wire_line
 from .program.problems import Problem, Severity
 from .program.records import End, MoveTo, Program, Record
@@ -78,6 +79,9 @@ class Downloaded:
     was_dry_run: bool
 
 
+_KIND: Final = "program"
+
+
 class ProgramMemory(ProgramRun):
     """
     N001 to N250 of a drive, one instruction each (UG p. 95), and the program that they are.
@@ -85,6 +89,9 @@ class ProgramMemory(ProgramRun):
     The form in which RS-232 writes a record is inferred (``Dialect.record``), so each one is read back. What a drive
     does with a record that comes while it runs a program or moves is not documented: it is refused here.
     """
+
+    incomplete: RestoreIncompleteError | None = None
+    """What the last download has left half done, for :meth:`roll_back`, also when its caller was cancelled."""
 
     # One ------------------------------------------------------------------------------------------------------------
 
@@ -110,14 +117,14 @@ class ProgramMemory(ProgramRun):
         Raises:
             UnexpectedAnswerError: It cannot be read, or may be cut: ``ACCEL 25`` may be ``ACCEL 250``.
         """
-        text = await self.read(number)
+        text = await self._shown(number)
         record = read_shown(text, decimals=self._decimals)
         if record is None:
             raise UnexpectedAnswerError(
                 f"{_name(number)} cannot be read, or may be cut at 30 characters (IBS p. 54)",
                 device=self._line.name,
                 sent=f"N{number}",
-                received=text,
+                received=text.strip(),
                 hint="read() gives its text; write it anew to be sure of it",
                 exchanges=self._line.link.recent(),
             )
@@ -174,7 +181,7 @@ class ProgramMemory(ProgramRun):
         texts: dict[int, str] = {}
         for done, number in enumerate(numbers, start=1):
             try:
-                texts[number] = await self.read(number)
+                texts[number] = await self._shown(number)
             except CommandRejectedError as error:
                 texts[number] = error.received or ""
             if on_progress is not None:
@@ -183,7 +190,7 @@ class ProgramMemory(ProgramRun):
         unused = superfluous_ends(memory)
         return Uploaded(
             program=Program({n: record for n, record in memory.items() if record is not None and n not in unused}),
-            unreadable={number: texts[number] for number, record in memory.items() if record is None},
+            unreadable={number: texts[number].strip() for number, record in memory.items() if record is None},
         )
 
     async def save(self, path: str | Path, *, on_progress: Progress | None = None) -> Uploaded:
@@ -211,8 +218,9 @@ class ProgramMemory(ProgramRun):
         """
         Check a program, compare it with what is there, and write what differs, each record read back.
 
-        Records that it does not name are left as they are. The first that fails ends it; a caller that is cancelled
-        leaves the records that were written until then.
+        Records that it does not name are left as they are. The first that fails ends it. If its caller is cancelled, a
+        note on the CancelledError and a warning in the log say how far it got, and :attr:`incomplete` has it for
+        :meth:`roll_back`.
 
         Args:
             source: A file or its name; a listing, which has a line break or begins with a record number; its lines; or
@@ -229,7 +237,9 @@ class ProgramMemory(ProgramRun):
                 which were applied, which not, and which is uncertain. :meth:`roll_back` takes them back.
             OSError: The file cannot be read.
         """
-        program, warnings = self._checked_program(await load_listing(source))
+        loaded = await load_listing(source)
+        # In a thread: a listing of 250 records takes a while, and other drives have moves to watch.
+        program, warnings = await asyncio.get_running_loop().run_in_executor(None, self._checked_program, loaded)
         if not (program or clear_rest):
             raise InvalidCommandError("there is no record in the listing", hint="begin each line like N001:")
         wanted = {**(dict.fromkeys(RECORD_NUMBERS, End()) if clear_rest else {}), **program}
@@ -252,18 +262,23 @@ class ProgramMemory(ProgramRun):
         """
         Write the records that the drive had before a download that was not completed, the uncertain one first.
 
-        The first that fails raises, as :meth:`write` does; it can be repeated.
+        The first that fails raises, as :meth:`write` does, with a note on how far it got; it can be repeated.
 
         Raises:
             InvalidCommandError: What the drive had shown of some cannot be read, or may be cut; the others are back.
+                Or *error* is no program's, or that of another drive; nothing was written.
         """
         lost: list[str] = []
-        for number, (old, _) in (*reversed(error.uncertain.items()), *reversed(error.applied.items())):
-            record = read_shown(old, decimals=self._decimals)
-            if record is None:
-                lost.append(f"{_name(number)} ({old!r})")
-            else:
-                await self.write(number, record)
+        with RollBack(error, _KIND, self._line.name, _name) as back:
+            for number, old in back.old.items():
+                record = read_shown(old, decimals=self._decimals)
+                if record is None:
+                    lost.append(f"{_name(number)} ({old!r})")
+                else:
+                    await self.write(number, record)
+                    back.done.append(number)
+        if error is self.incomplete:
+            self.incomplete = None
         if lost:
             raise InvalidCommandError(
                 f"not rolled back, for what the drive had shown cannot be read or may be cut: {', '.join(lost)}",
@@ -280,6 +295,11 @@ class ProgramMemory(ProgramRun):
     @property
     def _template(self) -> str:
         return self._line.settings.dialect.record
+
+    async def _shown(self, number: int) -> str:
+        """Read a record, with blanks before it if the drive sent some: they count where an answer may be cut."""
+        answer = await self._line.query(f"N{check_record_number(number)}")
+        return value_text(answer).rjust(len(answer) - len(RECORD_TEMPLATE.format(n=number, text="")))
 
     def _checked_record(self, number: int, record: str | Record) -> Record:
         text = record if isinstance(record, str) else record_text(record)
@@ -302,7 +322,7 @@ class ProgramMemory(ProgramRun):
     async def _changes(self, wanted: Mapping[int, Record]) -> dict[int, tuple[str, str]]:
         changes = {}
         for number, record in sorted(wanted.items()):
-            old = await self.read(number)
+            old = await self._shown(number)
             if compare(old, record, decimals=self._decimals) is not Shown.SAME:
                 changes[number] = (old, record_text(record))
         return changes
@@ -314,23 +334,23 @@ class ProgramMemory(ProgramRun):
         except AnswerTimeoutError as error:
             error.hint = "whether the drive took it is unknown; read the record"
             with suppress(CompaxError):
-                text = await self.read(number)
+                text = await self._shown(number)
                 if compare(text, record, decimals=self._decimals) is Shown.SAME:
-                    return WrittenRecord(number=number, text=text, is_verified=True)
-                error.hint = f"the record shows {text!r} now"
+                    return WrittenRecord(number=number, text=text.strip(), is_verified=True)
+                error.hint = f"the record shows {text.strip()!r} now"
             raise
-        text = await self.read(number)
+        text = await self._shown(number)
         shown = compare(text, record, decimals=self._decimals)
         if shown is Shown.OTHER:
             raise UnexpectedAnswerError(
-                f"{_name(number)} was written as {record_text(record)!r} and reads back as {text!r}",
+                f"{_name(number)} was written as {record_text(record)!r} and reads back as {text.strip()!r}",
                 device=self._line.name,
                 sent=line,
                 hint="the drive words it otherwise, refuses it in silence (P20), or takes records in another form "
                 "(Dialect.record)",
                 exchanges=self._line.link.recent(),
             )
-        return WrittenRecord(number=number, text=text, is_verified=shown is Shown.SAME)
+        return WrittenRecord(number=number, text=text.strip(), is_verified=shown is Shown.SAME)
 
     async def _write_all(
         self,
@@ -339,52 +359,41 @@ class ProgramMemory(ProgramRun):
         written: list[WrittenRecord],
         on_progress: Progress | None,
     ) -> None:
-        for number in changes:
-            sent: list[int] = []
-            try:
+        self.incomplete = None
+        account, number = HalfDone(changes, _name), 0
+        try:
+            for number in changes:
+                account.begin(number)
                 await self._refuse_while_busy(_name(number))
-                written.append(await self._write(number, wanted[number], partial(sent.append, number)))
-            except CompaxError as error:
-                refused = isinstance(error, CommandRejectedError) and error.sent != f"N{number}"
-                raise self._incomplete(
-                    error, number, changes, [each.number for each in written], is_uncertain=bool(sent) and not refused
-                ) from error
-            if on_progress is not None:
-                on_progress(len(written), len(changes))
+                written.append(await self._write(number, wanted[number], account.note_sent))
+                account.note_applied()
+                if on_progress is not None:
+                    on_progress(len(written), len(changes))
+        except BaseException as error:
+            account.note_failure(error, f"N{number}")
+            self.incomplete = self._incomplete(error, number, account)
+            if isinstance(error, CompaxError):
+                raise self.incomplete from error
+            account.tell_with(error, self.incomplete)
+            raise
 
-    def _incomplete(
-        self,
-        error: CompaxError,
-        number: int,
-        changes: Mapping[int, tuple[str, str]],
-        applied: Iterable[int],
-        *,
-        is_uncertain: bool,
-    ) -> RestoreIncompleteError:
-        done = {each: changes[each] for each in applied}
-        uncertain = {number: changes[number]} if is_uncertain else {}
-        left = tuple(each for each in changes if each not in done and each not in uncertain)
-        lists = f"applied: {_names(done)}; not applied: {_names(left)}"
-        if uncertain:
-            lists += f"; uncertain: {_names(uncertain)}"
-        return RestoreIncompleteError(
-            f"{_name(number)}: {changes[number][1]} was {'written, but not surely' if uncertain else 'not'} taken: "
-            f"{error.what}; {lists}",
+    def _incomplete(self, error: BaseException, number: int, account: HalfDone) -> RestoreIncompleteError:
+        told = error if isinstance(error, CompaxError) else None
+        what = "the download did not come to its end"
+        if number not in account.applied:
+            taken = "written, but not surely taken" if account.uncertain else "not taken"
+            what = f"{_name(number)}: {account.changes[number][1]} was {taken}"
+        return account.report(
+            f"{what}: {told.what if told else f'it was ended by {type(error).__name__}'}",
+            kind=_KIND,
             device=self._line.name,
-            sent=error.sent,
-            received=error.received,
+            sent=told.sent if told else None,
+            received=told.received if told else None,
             hint="do not start a program of which only a part is there: mend the cause and download it again, or "
             "roll_back() what was written",
-            exchanges=error.exchanges,
-            applied=done,
-            not_applied=left,
-            uncertain=uncertain,
+            exchanges=told.exchanges if told else self._line.link.recent(),
         )
 
 
 def _name(number: int) -> str:
     return f"N{number:03d}"
-
-
-def _names(numbers: Iterable[int]) -> str:
-    return ", ".join(map(_name, numbers)) or "none"

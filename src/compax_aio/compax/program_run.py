@@ -164,7 +164,7 @@ class ProgramRun:
         """
         if timeout_s is not None and not check_number("timeout_s", timeout_s) > 0:
             raise InvalidCommandError(f"timeout_s must be above 0, not {timeout_s!r}")
-        loop = asyncio.get_running_loop()
+        loop, mark = asyncio.get_running_loop(), self._motion.untracked.mark()
         give_up_at = None if timeout_s is None else loop.time() + timeout_s
         showed_stop, interval_s = self._showed_stop, self._line.settings.poll_first_s
         while _is_at_work(status := await self._observer.patiently(self._observer.read_status)):
@@ -180,7 +180,7 @@ class ProgramRun:
                 )
             await asyncio.sleep(pause_s)
             interval_s = min(interval_s * _POLL_GROWTH, self._line.settings.poll_slowest_s)
-        self._motion.note_untracked(ended=True)
+        self._motion.untracked.note_over(mark)
         await self._refuse_fault(status, "a fault ended the program")
         if _shows_stop(status):
             raise self._ended_by_stop(status, showed_before=showed_stop)
@@ -240,7 +240,7 @@ class ProgramRun:
                 )
                 raise
             return
-        if not self._line.tells_errors and not await self._has_begun(before, None):
+        if not self._line.transfer.tells_errors and not await self._has_begun(before, None):
             raise self._doubt(
                 f"{text!r} got a prompt, which proves nothing on a drive that keeps quiet about errors (P20), and no "
                 "program is running",
@@ -263,7 +263,7 @@ class ProgramRun:
         give_up_at = loop.time() + self._line.settings.standstill_timeout_s
         while _is_at_work(status := await self._observer.patiently(self._observer.read_status)):
             if loop.time() >= give_up_at:
-                self._motion.note_untracked()  # leaving the block tries again
+                self._motion.untracked.note()  # leaving the block tries again
                 raise MoveTimeoutError(
                     f"{sent} was acknowledged, but {self._line.settings.standstill_timeout_s:g} s later "
                     f"{'the program runs' if status.program_running else 'a command is active'}",

@@ -310,7 +310,7 @@ class CompaxProtocol:
             self._read_prompt()
         elif answer := ANSWER.fullmatch(line):
             self._read_answer((answer[1], answer[2]), line)
-        elif error := self._error.search(line):
+        elif (error := self._error.search(line)) and (error[1] or "").isdecimal():  # the pattern may be a user's
             self._read_error(int(error[1]), line)
         elif self._is_command_outstanding:
             self._end_turn(UnexpectedAnswer(line))

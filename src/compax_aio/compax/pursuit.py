@@ -21,7 +21,7 @@ from ..errors import (
     MoveInDoubtError,
 )
 from ..link.contract import Lane, TurnOver
-from .binary import is_motion_frame
+from .facts.device_errors import MOVE_ACTIVE_CODE
 from .facts.line import EXECUTE_SIGN, POSITION_REACHED_SIGN, STORE_SIGN
 from .memory import Memory
 from .moves import Move, PreparedMove
@@ -102,40 +102,34 @@ class Pursuit:
         """Find out where the move begins, as far as it matters, and say everything but the motion itself."""
         plan = self.move.plan
         if plan.distance is not None:
+            self._refuse_if_active(await self._observer.look())
             target = round(await self._observer.standing_position() + plan.distance, self._settings.decimals)
             self.move.target = check_travel(target, self._settings)
-        for text in plan.settings_lines:
-            await self._set(text)
-        await self._line.settle_settings()
-        self._memory.speed_is_unknown &= not plan.sets_speed
+        await self._line.transfer.say_settings(plan.settings_lines)
         for text in plan.point_lines:
-            self._memory.points_prepared += 1
             try:
-                await self._line.command(text, Lane.MOTION)
+                await self._line.command(text, Lane.MOTION, self._note_point)
             except CommandRejectedError:
                 self._memory.points_prepared -= 1
                 raise
         if plan.finds_machine_zero:
             await self._look_before_homing()
 
-    async def _set(self, text: str) -> None:
-        try:
-            await self._line.command(text, Lane.MOTION)
-        except AnswerTimeoutError:
-            # Cut in binary it may mean anything; twice as text it does no harm.
-            if not self._line.has_unsure_settings:
-                raise
+    def _note_point(self) -> None:
+        self._memory.points_prepared += 1
 
     async def _hold_ready(self, move: PreparedMove) -> None:
         """Let the drive store the motion, and wait until it is triggered."""
         # A drive that keeps quiet about errors may have refused it, and would execute what it had stored before.
-        if self._line.tells_errors:
+        if self._line.transfer.tells_errors:
             asks = self._asks_for_message and self._settings.message_when_prepared
             text = move.plan.motion + (POSITION_REACHED_SIGN if asks else "") + STORE_SIGN
             link = self._line.link
 
             def on_sent() -> None:
-                self._stored = _Stored(link.lines_sent, asks)
+                # An older one that was never triggered must not be executed in place of a store that got lost.
+                self._stored = _Stored(link.lines_sent, asks) if self._memory.stored == 0 else None
+                self._memory.stored += 1
                 link.hold_reads(self._settings.answer_timeout_s)
 
             await self._line.command(text, Lane.MOTION, on_sent)
@@ -152,7 +146,7 @@ class Pursuit:
         if self._stored is not None and self._stored.lines_sent == link.lines_sent and link.is_free:
             return EXECUTE_SIGN, self._stored.asks_for_message
         motion = self.move.plan.motion
-        if self._asks_for_message and not is_motion_frame(self._line.protocol.encode(motion)):
+        if self._asks_for_message and not self._line.transfer.is_motion_frame(motion):
             return motion + POSITION_REACHED_SIGN, True
         return motion, False  # a frame takes no sign (UG p. 166)
 
@@ -160,7 +154,7 @@ class Pursuit:
         """Put the motion on the wire, once, and return when it is known to be accepted."""
         plan = self.move.plan
         text, owes_message = self._starting_line()
-        self._sent_as_frame = is_motion_frame(self._line.protocol.encode(text))
+        self._sent_as_frame = self._line.transfer.is_motion_frame(text)
 
         def on_sent() -> None:
             self.move.note_sent(text)
@@ -178,12 +172,27 @@ class Pursuit:
             await self._find_out(error)
             return
         if isinstance(outcome, Acknowledged):
+            self._memory.stored -= text == EXECUTE_SIGN
             self.move.note_accepted()
             return
         refusal = self._line.error_of(text, outcome)
         if isinstance(refusal, CommandRejectedError):
             self._memory.messages_owed -= owes_message
+            self._owes_message = False
             self._memory.points_prepared = len(plan.point_lines)
+            await self._look_whether_refused(refusal)
+            return
+        await self._find_out(refusal)
+
+    async def _look_whether_refused(self, refusal: CommandRejectedError) -> None:
+        """Raise *refusal*, unless the drive moves all the same: an error that came twice may be another line's."""
+        if refusal.code == MOVE_ACTIVE_CODE:
+            raise refusal  # and somebody else's motion runs
+        try:
+            moves = (await self._observer.read_status()).command_active
+        except CompaxError:
+            raise refusal from None
+        if not moves:
             raise refusal
         await self._find_out(refusal)
 
@@ -214,9 +223,7 @@ class Pursuit:
             MoveInDoubtError: The status cannot tell, or is not to be had.
         """
         if self._sent_as_frame:
-            self._line.give_up_binary(self.move.plan.motion)
-            # Cut, and completed by the bytes of a stop, it may even have become a SPEED.
-            self._memory.speed_is_unknown = True
+            self._line.transfer.motion_was_lost(self.move.plan.motion)
             raise self._doubt("it went in binary, and may have arrived cut", error)
         look = await self._look(error)
         status = look.status

@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from math import isfinite
+from numbers import Real
 from pathlib import Path
 from typing import Final
 
@@ -61,6 +62,11 @@ class Dialect:
     power_off_brake_open: str = "OT O0=2"
     """No current, brake open: a hanging load falls."""
 
+    @property
+    def motions(self) -> tuple[str, ...]:
+        """The words that set the axis in motion, or a program that may."""
+        return tuple(word for word in (self.home, self.start, self.single_record) if word)
+
     def __post_init__(self) -> None:
         """Refuse what cannot be sent."""
         for each in fields(self):
@@ -73,8 +79,9 @@ class Dialect:
                 check_line(word.format(**places))
             except (AttributeError, LookupError, TypeError, ValueError) as error:
                 wanted = ", ".join(f"{{{place}}}" for place in places) or "none"
+                why = f"it has no place {error}" if isinstance(error, LookupError) else error
                 raise InvalidCommandError(
-                    f"the word for {each.name} cannot be {word!r}: {error}", hint=f"places it may have: {wanted}"
+                    f"the word for {each.name} cannot be {word!r}: {why}", hint=f"places it may have: {wanted}"
                 ) from error
             if missing := [place for place in places if f"{{{place}" not in word]:
                 raise InvalidCommandError(f"the word for {each.name} must hold {{{missing[0]}}}, unlike {word!r}")
@@ -144,6 +151,8 @@ class DriveSettings:
         """Refuse what cannot be meant."""
         for each in fields(self):
             value = getattr(self, each.name)
+            if not _is_of_kind(each.name, value, each.default):
+                raise InvalidCommandError(f"{each.name} cannot be {value!r}", hint=_KINDS.get(each.name))
             if each.name.endswith("_s") and not (isfinite(value) and value > 0):
                 raise InvalidCommandError(f"{each.name} must be a finite number of seconds above 0, not {value!r}")
         for decimals in (self.decimals, *(unit.decimals for unit in self.units.values())):
@@ -189,6 +198,31 @@ class DriveSettings:
         from .settings_file import write_settings  # noqa: PLC0415 - which knows this class
 
         write_settings(path, self)
+
+
+_KINDS: Final = {
+    "dialect": "it is a Dialect(...)",
+    "message_form": "it is a MessageForm",
+    "travel": "it is a lowest and a highest position, (-10, 500), or None",
+    "units": "by value of P90: {1: AxisUnit('mm')}",
+}
+
+
+def _is_of_kind(name: str, value: object, default: object) -> bool:
+    """Whether a setting is of the kind that it must be: a wrong word for STOP must not be found when it is wanted."""
+    if name == "units":
+        return isinstance(value, Mapping) and all(
+            type(code) is int and isinstance(unit, AxisUnit) for code, unit in value.items()
+        )
+    if name == "travel":
+        return value is None or (isinstance(value, tuple | list) and all(map(_is_number, value)))
+    if name == "dialect":
+        return isinstance(value, Dialect)
+    return _is_number(value) if isinstance(default, float) else isinstance(value, type(default)) or name == "decimals"
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)
 
 
 def _check_error_pattern(pattern: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 import typing
 from collections.abc import Iterable, Iterator, Mapping
 from difflib import get_close_matches
@@ -20,6 +21,9 @@ from .value_file import read_toml, replace_file
 __all__ = ["read_settings", "settings_text", "write_settings"]
 
 _Table = TypeVar("_Table", DriveSettings, Dialect, AxisUnit)
+
+_LONGEST_NUMBER: Final = 12
+"""Digits of a value of P90."""
 
 _HEAD: Final = """\
 # Settings of a COMPAX drive for compax_aio. What is left out has its default.
@@ -130,7 +134,7 @@ def _units(value: object, name: str) -> dict[int, AxisUnit]:
 
 
 def _is_whole(text: str) -> bool:
-    return text.isascii() and text.removeprefix("-").isdigit() and str(int(text)) == text
+    return len(text) <= _LONGEST_NUMBER and re.fullmatch(r"-?(0|[1-9][0-9]*)", text) is not None and text != "-0"
 
 
 # Writing ------------------------------------------------------------------------------------------------------------

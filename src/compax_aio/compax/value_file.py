@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-import tempfile
+import secrets
 import tomllib
 from collections.abc import Mapping
 from contextlib import suppress
@@ -19,8 +19,9 @@ from ..errors import InvalidCommandError
 __all__ = ["ValueFile", "read_file", "read_toml", "replace_file", "write_file"]
 
 _MAX_BYTES: Final = 256 * 1024
-_KEY: Final = re.compile(r"([PV])(\d{1,3})")
-_NOT_IN_STRINGS: Final = re.compile(r'[\x00-\x1f\x7f"\\]')
+_KEY: Final = re.compile(r"([PV])([0-9]{1,3})")
+_MAX_DECIMALS: Final = 15
+"""Enough for whatever a number in an answer has told."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,34 +55,54 @@ def write_file(
     lines = [
         f"# {kind.capitalize()} of a COMPAX drive, as it sent them.",
         f'kind = "{kind}"',
-        f'drive = "{_NOT_IN_STRINGS.sub("?", drive)}"',
+        f'drive = "{_plain(drive)}"',
         f"saved_at = {saved_at.isoformat(timespec='seconds')}",
         "",
         f"[{kind}]",
     ]
     for number, value in sorted(values.items()):
-        line = f"{letter}{number} = {value:.{decimals[number]}f}"
-        lines.append(f"{line:<24}# {comments[number]}" if number in comments else line)
+        line = f"{letter}{number} = {_as_sent(value, decimals[number])}"
+        lines.append(f"{line:<24}# {_plain(comments[number])}" if number in comments else line)
     replace_file(path, "\n".join(lines) + "\n")
+
+
+def _as_sent(value: float, decimals: int) -> str:
+    """Write *value* with *decimals*, or with as many more as it has: what was not sent is not written."""
+    exact = (f"{value:.{more}f}" for more in range(decimals, _MAX_DECIMALS))
+    return next((text for text in exact if float(text) == value), repr(value))
+
+
+def _plain(text: str) -> str:
+    """Write *text* so that it neither ends a line, nor a string, nor is lost on the way to a file."""
+    return "".join(each if each.isprintable() and each not in '"\\' else "?" for each in text)
 
 
 def replace_file(path: Path, text: str) -> None:
     """
     Write *text* to *path*; a file that is there is replaced at the end, or left as it is.
 
+    It keeps its permissions, and a link stays one: the file that it leads to is replaced.
+
     Raises:
         OSError: The file cannot be written.
     """
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
+    path = Path(os.path.realpath(path))
+    new = path.parent / f".{path.name[:32]}.{secrets.token_hex(4)}"
+    with new.open("x", encoding="utf-8") as file:
+        try:
             file.write(text)
             file.flush()
             os.fsync(file.fileno())
-        Path(name).replace(path)
+            with suppress(OSError):  # there is none, or it is another's
+                new.chmod(path.stat().st_mode)
+        except BaseException:
+            new.unlink()
+            raise
+    try:
+        new.replace(path)
     except BaseException:
         with suppress(OSError):
-            Path(name).unlink()
+            new.unlink()
         raise
 
 
@@ -98,9 +119,11 @@ def read_toml(path: Path, kind: str) -> dict[str, Any]:
     if len(data) > _MAX_BYTES:
         raise InvalidCommandError(f"{path} is larger than any file of {kind}: more than {_MAX_BYTES} bytes")
     try:
-        return tomllib.loads(data.decode("utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        content = tomllib.loads(data.decode("utf-8-sig"))
+        repr(content)  # as whoever tells what is wrong with it will want to
+    except (ValueError, RecursionError) as error:  # no TOML, no text, or a number of thousands of digits
         raise InvalidCommandError(f"{path} is no TOML: {error}") from error
+    return content
 
 
 def read_file(path: Path, *, kind: str, letter: str) -> ValueFile:
@@ -125,9 +148,15 @@ def read_file(path: Path, *, kind: str, letter: str) -> ValueFile:
         found = _KEY.fullmatch(key)
         if found is None or found[1] != letter or int(found[2]) in values:
             raise InvalidCommandError(f"{path}: {key!r} is not one of {letter}1, {letter}2, …, each once")
-        if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
-            raise InvalidCommandError(f"{path}: {key} = {value!r} is no number")
-        values[int(found[2])] = float(value)
+        values[int(found[2])] = _number(path, key, value)
     return ValueFile(
         kind=kind, drive=str(content.get("drive", "")), saved_at=str(content.get("saved_at", "")), values=values
     )
+
+
+def _number(path: Path, key: str, value: object) -> float:
+    if not isinstance(value, bool) and isinstance(value, int | float):
+        with suppress(OverflowError):
+            if isfinite(value):
+                return float(value)
+    raise InvalidCommandError(f"{path}: {key} = {value!r:.60} is no number that a drive has")

@@ -120,7 +120,7 @@ def plan_move_to(
         target=target,
         settings_lines=_settings_lines(settings, speed_percent, acceleration_ms, deceleration_ms),
         sets_speed=speed_percent is not None,
-        point_lines=_point_lines(settings, steps, points := tuple(comparators)),
+        point_lines=_point_lines(settings, steps, points := tuple(_all("comparators", comparators))),
         comparators=len(points),
         motion=check_line(f"PA{_written(target, settings.decimals)}", room_for_sign=True),
     )
@@ -152,7 +152,7 @@ def plan_move_by(
         distance=rounded,
         settings_lines=_settings_lines(settings, speed_percent, acceleration_ms, deceleration_ms),
         sets_speed=speed_percent is not None,
-        point_lines=_point_lines(settings, steps, points := tuple(comparators)),
+        point_lines=_point_lines(settings, steps, points := tuple(_all("comparators", comparators))),
         comparators=len(points),
         motion=check_line(f"PR{_written(rounded, settings.decimals)}", room_for_sign=True),
     )
@@ -239,7 +239,7 @@ def _point_lines(
     comparators: Iterable[Comparator | tuple[float, int] | tuple[float, int, int]],
 ) -> tuple[str, ...]:
     lines = []
-    for each in steps:
+    for each in _all("steps", steps):
         step = each if isinstance(each, SpeedStep) else _of_tuple(SpeedStep, each)
         speed = _whole_speed("the speed of a speed step", step.speed_percent, settings)
         lines.append(f"PR{_point_distance(step.distance, settings)} SD{speed}")
@@ -268,6 +268,13 @@ def _whole_speed(what: str, value: float, settings: DriveSettings) -> int:
             f"{what} is a whole number from 1 to {settings.speed_limit_percent:g} (UG p. 101), not {value!r}"
         )
     return int(speed)
+
+
+def _all(what: str, points: Iterable[_Point]) -> Iterable[_Point]:
+    try:
+        return iter(points)
+    except TypeError:
+        raise InvalidCommandError(f"{what} are several, as a list or tuple, not {points!r}") from None
 
 
 def _of_tuple(kind: type[_Point], values: object) -> _Point:

@@ -71,6 +71,8 @@ class Watch(AsyncIterator[Reading]):
         skipped: Readings that this consumer was too slow to see.
     """
 
+    has_ended = True  # until it is made
+
     def __init__(
         self, quantities: tuple[str, ...], interval_s: float, leave: Callable[[], None], dropped: Callable[[], None]
     ) -> None:

@@ -44,12 +44,13 @@ class Failures:
         return AnswerTimeoutError(
             f"no sensible answer to {self._resync_attempts} queries in a row, {self._answer_timeout_s:g} s each",
             device=self._name,
-            sent=exchange.text if exchange else None,
+            sent=exchange.text if exchange else self._history.last_sent(),
             received=received,
             hint=(
                 "what comes is no answer of this device: check baud rate and parity, and which device this is"
                 if received
-                else "check power, cable (crossed, not straight), port and baud rate, and the handshake lines"
+                else "check power, cable (crossed, not straight), port and baud rate, and the handshake lines; a "
+                "device that takes longer to answer wants more answer_timeout_s"
             ),
             exchanges=self._history.lines(),
         )
@@ -80,7 +81,7 @@ class Failures:
         return UnexpectedAnswerError(
             f"the far end looks like {stranger.name}",
             device=self._name,
-            sent=exchange.text if exchange else None,
+            sent=exchange.text if exchange else self._history.last_sent(),
             received=self._history.received_since_sent(),
             hint=stranger.remedy,
             exchanges=self._history.lines(),
@@ -91,6 +92,8 @@ class Failures:
     ) -> ConnectionLostError:
         """Say that the line is gone."""
         hint = None if is_closing else "a drive that was moving may go on; look at it before you connect again"
+        if hint is not None and not self._history.has_received:
+            hint = f"it has said nothing yet: is somebody else connected to that port already? {hint}"
         if hold is not None:
             hint = f"{hold.why}: look at the machine, and switch the device off and on before you connect again"
         error = ConnectionLostError(

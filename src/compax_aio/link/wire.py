@@ -42,6 +42,17 @@ class WireHistory:
             return readable(self._entries[-1][2])
         return None
 
+    def last_sent(self) -> str | None:
+        """Return what went out last, readable and without its CR; None if nothing did."""
+        return next(
+            (readable(data).removesuffix("␍") for _, arrow, data in reversed(self._entries) if arrow == "→"), None
+        )
+
+    @property
+    def has_received(self) -> bool:
+        """Whether anything has come in, as far back as this goes."""
+        return any(arrow == "←" for _, arrow, _ in self._entries)
+
     def lines(self) -> tuple[str, ...]:
         """Return the ring, oldest first: ``12.345 → PA100$␍``."""
         return tuple(f"{at:.3f} {arrow} {readable(data)}" for at, arrow, data in self._entries)

@@ -18,7 +18,7 @@ _Ts = TypeVarTuple("_Ts")
 
 # Bytes that this process has written to its own sockets and ptys need a moment to come out at their other end. While
 # such lines are open, time jumps only after that long a real silence; with in-memory lines alone it jumps at once.
-_REAL_SILENCE_S = 0.002
+_REAL_SILENCE_S = 0.01
 
 
 class VirtualClockLoop(asyncio.SelectorEventLoop):

@@ -13,6 +13,7 @@ __all__ = [
     "FAULT_CODES",
     "HISTORY_ACKNOWLEDGED",
     "HISTORY_POWERED_ON",
+    "MOVE_ACTIVE_CODE",
     "DeviceError",
     "ErrorRange",
     "device_error",
@@ -51,6 +52,9 @@ class ErrorRange:
     certainty: Certainty = Certainty.DOCUMENTED
 
 
+MOVE_ACTIVE_CODE: Final = 92
+"""Answers a positioning command while another one runs (UG p. 162, 209)."""
+
 DEVICE_ERRORS: Final = (
     DeviceError(
         code=10,
@@ -64,11 +68,11 @@ DEVICE_ERRORS: Final = (
         meaning="overload of motor or unit",
         cause="the effective load of motor or unit has reached 100 % (quantities 29 and 30 of S13 to S15)",
         remedy="reduce load or duty, then quit()",
-        page=209,
+        page=211,
     ),
     DeviceError(code=55, meaning="emergency stop", remedy="release the emergency stop, then quit()", page=209),
     DeviceError(
-        code=92,
+        code=MOVE_ACTIVE_CODE,
         meaning="a move is already active",
         cause="a positioning command came while S17 bit 3 was 1",
         remedy="await it or stop it first",

@@ -22,7 +22,7 @@ POSITION_DECIMALS_INCH: Final = 3
 """Decimals of positions and distances in inches (UG p. 100)."""
 
 MAX_POSITION: Final = 4_000_000.0
-"""Largest position or distance either way, in the axis's own unit (UG p. 104, IBS p. 33)."""
+"""Largest position or distance either way, in the axis's own unit (UG p. 104, IBS p. 33, about)."""
 
 MAX_PREPARED_POINTS: Final = 8
 """Speed steps and comparators of one positioning, together (UG p. 101)."""
@@ -37,4 +37,4 @@ MAX_ACCELERATION_TIME_MS: Final = 65_000
 """For ACCEL and ACCEL-, whole milliseconds from 0 on (IBS p. 48)."""
 
 OUTPUT_NUMBERS: Final = range(1, 17)
-"""Outputs O1-O16; O0 is the power stage and no output of a comparator (UG p. 162)."""
+"""O0 is the power stage and no output of a comparator (UG p. 162); that the others end at O16 is inferred."""

@@ -26,7 +26,7 @@ COMMAND_END: Final = b"\r"
 """Ends a command; an LF after it has no meaning to the drive (UG p. 160)."""
 
 MAX_LINE_LENGTH: Final = 30
-"""Characters in the entry buffer and in the output buffer (UG p. 160), counted without CR."""
+"""Characters in the entry buffer and in the output buffer (UG p. 160); that CR is not counted is inferred."""
 
 POSITION_REACHED_SIGN: Final = "$"
 """After POSA or POSR: the drive sends ``$`` and its prompt at position reached (UG p. 160)."""

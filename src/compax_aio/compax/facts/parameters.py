@@ -9,6 +9,7 @@ from .certainty import Certainty
 
 __all__ = [
     "CONTROL_PARAMETERS",
+    "MAX_DIGITS",
     "MAX_PARAMETER",
     "PARAMETERS",
     "PASSWORD_OFF",
@@ -34,6 +35,9 @@ class ParameterFact:
 
 MAX_PARAMETER: Final = 250
 """P1-P250 (IBS p. 24)."""
+
+MAX_DIGITS: Final = 7
+"""Before the point of a value, at the PLC interface (UG p. 158); that RS-232 has no more is inferred."""
 
 CONTROL_PARAMETERS: Final = range(40, 50)
 """P40-P49: live values for programs, in force without VP (UG p. 100-101)."""
@@ -95,8 +99,8 @@ PARAMETERS: Final = (
         for number, meaning in (
             (71, "D/A monitor channel 0: gain or value"),
             (72, "D/A monitor channel 1: gain or value"),
-            (73, "D/A monitor channel 0: source"),
-            (74, "D/A monitor channel 1: source"),
+            (73, "D/A monitor channel 0: source; 39 is the voltage output"),
+            (74, "D/A monitor channel 1: source; 39 is the voltage output"),
         )
     ),
     ParameterFact(

@@ -106,7 +106,11 @@ S16_BITS: Final = (
 S17_BITS: Final = (
     StatusBit(bit=1, name="password_active", meaning_when_set="password 302 is active"),
     StatusBit(bit=2, name="service_password_active", meaning_when_set="the service password is active"),
-    StatusBit(bit=3, name="command_active", meaning_when_set="a positioning is running; POSA and POSR get E92"),
+    StatusBit(
+        bit=3,
+        name="command_active",
+        meaning_when_set="a positioning is running; POSA, POSR and, in speed control, SPEED get E92",
+    ),
     StatusBit(bit=4, name="program_running", meaning_when_set="the program memory is running"),
     StatusBit(bit=5, name="stopped_by_input", meaning_when_set="stopped by input I6"),
     StatusBit(bit=6, name="reserved", meaning_when_set="reserved"),

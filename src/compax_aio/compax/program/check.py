@@ -63,6 +63,8 @@ def check(
         InvalidCommandError: Only for what is no program at all: a record that cannot be written, or a bad *template*.
     """
     reading = read(program if isinstance(program, str) else listing(program), decimals=decimals)
+    if not reading.is_whole:
+        return reading.problems
     problems = [*reading.problems, *_too_long(reading, template), *_never_written(reading)]
     loop_ends, unclosed = _loops(reading)
     problems += unclosed

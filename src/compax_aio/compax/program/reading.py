@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from ..facts.limits import POSITION_DECIMALS
@@ -13,14 +13,17 @@ from .problems import Problem, Severity, raise_for_errors
 from .records import Program, Record, Variable
 from .scanning import Furthest, Scan, scan, whole_number
 
-__all__ = ["Reading", "SourceRecord", "normalise", "parse", "parse_record", "read"]
+__all__ = ["COMMENT", "Reading", "SourceRecord", "normalise", "parse", "parse_record", "read"]
 
 _LINE_END: Final = re.compile(r"\r\n|\r|\n")
 _NUMBERED: Final = re.compile(r"N([0-9]+):?")
 _NEXT_RECORD: Final = re.compile(r"N[0-9]+:")
-_COMMENT: Final = ";"
+COMMENT: Final = ";"
 _LONGEST: Final = 100
 """Characters without blanks: no record has a third of it, and reading the numbers in longer ones takes time."""
+
+_MOST_ERRORS: Final = 250
+"""There are no more records than that; reading on would take time, and tell nobody anything."""
 
 _SHOWN: Final = 5
 """Of what could have stood there, so many are named."""
@@ -54,6 +57,8 @@ class Reading:
     problems: list[Problem] = field(default_factory=list)
     unread: dict[int, int] = field(default_factory=dict)
     """Numbers of records that stand in the listing but could not be read, each with its line."""
+    is_whole: bool = True
+    """False: it has so many errors that the rest was not read."""
 
     @property
     def program(self) -> Program:
@@ -99,10 +104,17 @@ def parse_record(text: str, *, decimals: int = POSITION_DECIMALS) -> Record:
 
 
 def read(text: str, *, decimals: int = POSITION_DECIMALS) -> Reading:
-    """Read a listing as ``parse()`` does; never raises, but tells what is wrong, and keeps the rest."""
+    """
+    Read a listing as ``parse()`` does; never raises, but tells what is wrong, and keeps the rest.
+
+    After 250 errors it reads no further, and says so.
+    """
     reading = Reading()
     for line_number, line in enumerate(_LINE_END.split(text), start=1):
-        _read_line(reading, line_number, _Line(line.partition(_COMMENT)[0]), decimals)
+        if sum(problem.severity is Severity.ERROR for problem in reading.problems) >= _MOST_ERRORS:
+            reading.problems.append(_error(line_number, 1, "so many errors that the rest was not read", "mend these"))
+            return replace(reading, is_whole=False)
+        _read_line(reading, line_number, _Line(line.partition(COMMENT)[0]), decimals)
     return reading
 
 
@@ -113,7 +125,7 @@ def normalise(text: str) -> str:
     For comparing what the drive reads back with what was written, with or without record numbers. Never raises: what
     is no record stays as it is, in capitals and without blanks.
     """
-    lines = (_normal_line(_Line(line.partition(_COMMENT)[0])) for line in _LINE_END.split(text))
+    lines = (_normal_line(_Line(line.partition(COMMENT)[0])) for line in _LINE_END.split(text))
     return "\n".join(line for line in lines if line)
 
 

@@ -286,7 +286,7 @@ def _levels(scan: Scan) -> tuple[bool, ...] | None:
 
 
 def _output(scan: Scan) -> int | None:
-    number = _plain(scan, "the number of an output", OUTPUT_NUMBERS, "outputs are 1 to 16 (UG p. 162)")
+    number = _plain(scan, "the number of an output", OUTPUT_NUMBERS, "outputs are 1 to 16, as far as is known")
     scan.first = number or 0
     return number
 

@@ -12,7 +12,7 @@ from ...errors import InvalidCommandError
 from ..facts.line import MAX_LINE_LENGTH
 from ..facts.program_commands import RECORD_TEMPLATE
 from .printing import record_text, short_text
-from .reading import normalise, parse_record
+from .reading import COMMENT, normalise, parse_record
 from .records import End, Gosub, Goto, GotoExternal, Record, Repeat, Return
 
 __all__ = ["Shown", "compare", "may_be_cut", "read_shown", "superfluous_ends"]
@@ -45,7 +45,8 @@ def compare(text: str, record: Record, *, decimals: int) -> Shown:
         decimals: Of positions and distances: 2, or 3 where the unit is inches (UG p. 100).
     """
     whole, is_cut = record_text(record), may_be_cut(text, decimals=decimals)
-    if normalise(text) == normalise(whole):
+    # What stands behind a semicolon is a comment in a listing, and in an answer something else.
+    if normalise(text) == normalise(whole) and COMMENT not in text:
         return Shown.BEGINNING if is_cut else Shown.SAME
     # It may show the abbreviations with which it was written.
     if is_cut and any(_is_beginning(text, each) for each in (whole, short_text(record))):

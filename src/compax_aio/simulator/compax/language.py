@@ -283,7 +283,7 @@ _READERS: Final[Mapping[str, Callable[[str, Context], Instruction]]] = {
 _ALIASES: Final = {
     # POSA may be long or short before HOME as well.
     "PAHOME": "POSA HOME",
-    # The RS-232 texts of the control functions are unknown (row 13): a drive may have short ones. Placeholders.
+    # The RS-232 texts of the control functions are unknown: a drive may have short ones. Placeholders.
     "SP": "STOP",
     "ST": "START",
     "BR": "BREAK",
