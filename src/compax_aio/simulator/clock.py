@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import selectors
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -18,7 +19,9 @@ _Ts = TypeVarTuple("_Ts")
 
 # Bytes that this process has written to its own sockets and ptys need a moment to come out at their other end. While
 # such lines are open, time jumps only after that long a real silence; with in-memory lines alone it jumps at once.
-_REAL_SILENCE_S = 0.01
+_REAL_SILENCE_S = 0.002
+# What is written to a terminal is handed on by another task of the kernel, which has to get its turn.
+_REAL_SILENCE_OF_TERMINALS_S = 0.01
 
 
 class VirtualClockLoop(asyncio.SelectorEventLoop):
@@ -99,12 +102,18 @@ class _JumpingSelector(selectors.BaseSelector):
     def __init__(self, loop: VirtualClockLoop) -> None:
         self._loop = loop
         self._selector = selectors.DefaultSelector()
+        self._terminals: set[int] = set()
 
     def register(self, fileobj: FileDescriptorLike, events: int, data: Any = None) -> selectors.SelectorKey:
-        return self._selector.register(fileobj, events, data)
+        key = self._selector.register(fileobj, events, data)
+        if os.isatty(key.fd):
+            self._terminals.add(key.fd)
+        return key
 
     def unregister(self, fileobj: FileDescriptorLike) -> selectors.SelectorKey:
-        return self._selector.unregister(fileobj)
+        key = self._selector.unregister(fileobj)
+        self._terminals.discard(key.fd)
+        return key
 
     def modify(self, fileobj: FileDescriptorLike, events: int, data: Any = None) -> selectors.SelectorKey:
         return self._selector.modify(fileobj, events, data)
@@ -117,7 +126,7 @@ class _JumpingSelector(selectors.BaseSelector):
             return self._selector.select(None)
         # One descriptor is the loop's own, by which other threads wake it.
         if len(self.get_map()) > 1:
-            ready = self._selector.select(_REAL_SILENCE_S)
+            ready = self._selector.select(_REAL_SILENCE_OF_TERMINALS_S if self._terminals else _REAL_SILENCE_S)
             if ready:
                 return ready
         self._loop.jump(max(timeout, 0.0))
