@@ -18,6 +18,7 @@ pytestmark = [pytest.mark.real_time, pytest.mark.usefixtures("nothing_left_behin
 PROGRAM = """
     import asyncio, sys
     import compax_aio
+    from compax_aio.compax.program import End, MoveTo
 
     async def main():
         {body}
@@ -52,6 +53,25 @@ BODIES = {
         async with compax_aio.connect(sys.argv[1]) as drive:
             await drive.command("PA1000000")
             await asyncio.sleep(1000)
+    """,
+    "while a program runs": """
+        async with compax_aio.connect(sys.argv[1]) as drive:
+            await drive.program.download({1: MoveTo(1000000), 2: End()})
+            await drive.program.start(1)
+            await drive.program.wait_finished()
+    """,
+    "while somebody watches": """
+        async with compax_aio.connect(sys.argv[1]) as drive:
+            move = drive.move_to(1e6)
+            async for _ in drive.watch("position", "status", interval_s=0.01):
+                pass
+    """,
+    "when prepared and triggered": """
+        async with compax_aio.connect(sys.argv[1]) as drive:
+            move = drive.prepare_move_to(1e6)
+            await move.ready
+            move.trigger()
+            await move
     """,
 }
 
