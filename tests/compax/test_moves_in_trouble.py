@@ -502,3 +502,15 @@ async def test_a_drive_that_lost_its_power_on_the_way_did_not_reach_its_target()
         assert motions(far) == ["POSA 1000.00"]
         await asyncio.sleep(3)
         await drive.home()
+
+
+async def test_a_motion_that_was_seen_to_run_is_not_told_as_never_taken_after_the_power_came_back() -> None:
+    async with bench() as (drive, far):
+        move = drive.move_to(1000)
+        await received(far, "PA1000$")
+        far.lose_answers = 1  # that of the motion
+        await until(lambda: lines(far)[-1] != "PA1000$" and lines(far)[-2:] == ["S17", "S16"], to_the_tick=True)
+        far.power_cycle()
+        error = await ending(move)
+        assert not isinstance(error, AnswerTimeoutError)
+        assert "command it again" not in str(error)

@@ -31,6 +31,7 @@ __all__ = [
     "decode_monitor_value",
     "decode_number",
     "decode_status_value",
+    "shows_active",
     "value_text",
 ]
 
@@ -39,6 +40,7 @@ _NUMBER: Final = re.compile(r"(?<![A-Za-z\d.])([-+]?)\s*(\d+(?:\.\d*)?|\.\d+)")
 # Behind it a unit, or nothing: "1,5", "1 234.56" and "1.5E3" are numbers that would be misread.
 _BEHIND_NUMBER: Final = re.compile(r"(?![eE][-+]?\d)(?:\s*[^\d\s.,'+-]\S*)*\s*")
 _HEAD: Final = re.compile(r"[SPVN]\d+\s*[:=]?|[:=]")
+_ACTIVE_BIT: Final = next(bit.bit for bit in S17_BITS if bit.name == "command_active")
 _BITS: Final = re.compile(r"[01]{8}")
 _WHOLE: Final = re.compile(r"[-+]?\d{1,15}")
 _BROKEN: Final = re.compile(r"[-+]?(?:\d{1,15}\.\d*|\.\d+)")
@@ -266,6 +268,12 @@ def decode_interface(answer: str) -> SerialInterface:
     except UnexpectedAnswerError as error:
         error.received = answer
         raise
+
+
+def shows_active(s17: str) -> bool:
+    """Whether an answer to S17 says that a positioning runs (bit 3, UG p. 209); what is no such answer does not."""
+    digits = value_text(s17).replace(" ", "")
+    return _BITS.fullmatch(digits) is not None and digits[_ACTIVE_BIT - 1] == "1"
 
 
 def decode_history(answer: str) -> tuple[HistoryEntry, ...]:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from math import inf
 from typing import TypeVar
 
 from ..errors import AnswerTimeoutError, CommandRejectedError, ConnectionLostError, UnexpectedAnswerError
 from ..link.contract import Event, Lane, TurnOver
 from ..link.link import Link
-from .codecs import DriveStatus, decode_number
+from .codecs import DriveStatus, decode_number, shows_active
 from .facts.device_errors import device_error
 from .protocol import Acknowledged, Answered, CompaxProtocol, Rejected, UnexpectedAnswer
 from .settings import DriveSettings
@@ -50,6 +51,8 @@ class DriveLine:
             on_lost=on_lost,
         )
         self.last_position: float | None = None
+        self.active_seen_at = -inf
+        """Loop time at which the drive last said that a positioning runs."""
         self.transfer = Transfer(self)
 
     async def query(self, text: str, lane: Lane = Lane.READ) -> str:
@@ -118,6 +121,8 @@ class DriveLine:
     async def status(self, lane: Lane = Lane.READ) -> DriveStatus:
         """Read S17, then S16: a move that ends in between shows as ended."""
         s17 = await self.query("S17", lane)
+        if shows_active(s17):  # to be remembered also if no answer to S16 comes
+            self.active_seen_at = asyncio.get_running_loop().time()
         s16 = await self.query("S16", lane)
         return self._decoded(lambda answer: DriveStatus.decode(answer, s17), s16)
 

@@ -232,6 +232,8 @@ class Pursuit:
             self._points_may_be_left()
             raise self._reports.fault(self.move, look, await self._observer.read_error())
         if not status.command_active and not self._message_came and not await self._was_taken(look, error):
+            if self._line.active_seen_at > (self.move.started_at or 0.0):
+                raise self._doubt("it had begun, and the drive does not say how it ended", error)
             self._memory.points_prepared = len(self.move.plan.point_lines)
             error.hint = (
                 "the drive's status shows that it was not taken: it stands at "
