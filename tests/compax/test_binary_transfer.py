@@ -11,7 +11,7 @@ import pytest
 from tests.promises.bench import bench, ending, is_moving, lines, motions, now, scripted, served_through
 
 import compax_aio
-from compax_aio import Drive, DriveSettings, MoveError, MoveInDoubtError
+from compax_aio import Dialect, Drive, DriveSettings, MoveError, MoveInDoubtError
 from compax_aio.errors import AnswerTimeoutError
 from compax_aio.simulator.compax import Knobs, SimulatedDrive
 
@@ -220,3 +220,24 @@ async def test_a_drive_that_does_not_give_p20_is_used_all_the_same(
             assert drive.interface is None
             assert await drive.position() == 0
     assert "does not give P20" in caplog.text
+
+
+async def test_which_weight_of_p20_keeps_errors_quiet_is_a_setting() -> None:
+    settings = DriveSettings(errors_suppressed_weight=4, xonxoff_weight=8)
+    async with scripted({"P20": "P020: 4"}, settings=settings) as (drive, _):
+        assert drive.interface is not None
+        assert drive.interface.errors_suppressed
+        assert drive.interface.unknown == 0
+        assert drive.settings.verify_messages
+    async with scripted({"P20": "P020: 3"}, settings=settings) as (drive, _):
+        assert drive.interface is not None
+        assert not drive.interface.errors_suppressed
+        assert not drive.interface.xonxoff
+        assert drive.interface.unknown == 3
+
+
+async def test_how_a_parameter_is_written_is_a_word_of_the_dialect() -> None:
+    settings = DriveSettings(dialect=Dialect(write_value="{name} {value}"))
+    async with scripted({"P40": "P040: 1.500"}, settings=settings) as (drive, far):
+        await drive.parameters.write(40, 1.5)
+        assert "P40 1.500" in far.lines

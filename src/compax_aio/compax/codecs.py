@@ -16,7 +16,7 @@ from .facts.device_errors import (
     device_error,
 )
 from .facts.quantities import SELECTORS, quantity
-from .facts.serial_interface import BINARY_BIT, ERRORS_SUPPRESSED_BIT, INTERFACE_BITS, XONXOFF_BIT
+from .facts.serial_interface import BINARY_BIT, ERRORS_SUPPRESSED_BIT, XONXOFF_BIT
 from .facts.status import S16_BITS, S17_BITS, STATUS_VALUES, Form, StatusFact
 
 __all__ = [
@@ -133,7 +133,8 @@ class SerialInterface:
     """
     P20, how the serial interface behaves (UG p. 166).
 
-    Which bits stand for Xon/Xoff and for suppressed errors is inferred from the documented values 3 and 19.
+    Which weights stand for Xon/Xoff and for suppressed errors is inferred from the documented values 3 and 19;
+    ``DriveSettings`` can say it otherwise.
     """
 
     xonxoff: bool
@@ -146,7 +147,13 @@ class SerialInterface:
     """The weights of *raw* that no page at hand explains, added up; 0 if there are none."""
 
     @classmethod
-    def decode(cls, p20: float) -> SerialInterface:
+    def decode(
+        cls,
+        p20: float,
+        *,
+        xonxoff_weight: int = XONXOFF_BIT.weight,
+        errors_suppressed_weight: int = ERRORS_SUPPRESSED_BIT.weight,
+    ) -> SerialInterface:
         """
         Decode the value of P20.
 
@@ -156,10 +163,10 @@ class SerialInterface:
         if not isfinite(p20) or p20 != int(p20) or p20 < 0:
             raise UnexpectedAnswerError(f"P20 is a whole number of bits (UG p. 166), not {p20!r}")
         raw = int(p20)
-        known = sum(bit.weight for bit in INTERFACE_BITS if bit.name)
+        known = xonxoff_weight | errors_suppressed_weight | BINARY_BIT.weight
         return cls(
-            xonxoff=bool(raw & XONXOFF_BIT.weight),
-            errors_suppressed=bool(raw & ERRORS_SUPPRESSED_BIT.weight),
+            xonxoff=bool(raw & xonxoff_weight),
+            errors_suppressed=bool(raw & errors_suppressed_weight),
             binary=bool(raw & BINARY_BIT.weight),
             raw=raw,
             unknown=raw & ~known,
@@ -256,7 +263,12 @@ def decode_monitor_value(number: int, chosen: str, answer: str, axis_unit: str) 
     )
 
 
-def decode_interface(answer: str) -> SerialInterface:
+def decode_interface(
+    answer: str,
+    *,
+    xonxoff_weight: int = XONXOFF_BIT.weight,
+    errors_suppressed_weight: int = ERRORS_SUPPRESSED_BIT.weight,
+) -> SerialInterface:
     """
     Decode the answer to P20 (UG p. 166).
 
@@ -264,7 +276,11 @@ def decode_interface(answer: str) -> SerialInterface:
         UnexpectedAnswerError: It is not a whole number from 0 on.
     """
     try:
-        return SerialInterface.decode(decode_number(answer))
+        return SerialInterface.decode(
+            decode_number(answer),
+            xonxoff_weight=xonxoff_weight,
+            errors_suppressed_weight=errors_suppressed_weight,
+        )
     except UnexpectedAnswerError as error:
         error.received = answer
         raise

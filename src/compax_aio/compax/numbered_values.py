@@ -322,4 +322,5 @@ class NumberedValues:
                 f"{self._name(number)} cannot be {value!r}: a number has {MAX_DIGITS} digits before the point "
                 "(UG p. 158)"
             )
-        return check_line(f"{self._name(number)}={rounded:.{decimals}f}")
+        template = self._line.settings.dialect.write_value
+        return check_line(template.format(name=self._name(number), value=f"{rounded:.{decimals}f}"))

@@ -13,6 +13,7 @@ from typing import Final
 from ..errors import InvalidCommandError
 from .facts.limits import MAX_SPEED_PERCENT, POSITION_DECIMALS, POSITION_DECIMALS_INCH
 from .facts.line import ERROR_PATTERN
+from .facts.serial_interface import ERRORS_SUPPRESSED_BIT, XONXOFF_BIT
 from .plain_line import check_line
 from .protocol import MessageForm
 
@@ -20,6 +21,7 @@ __all__ = ["AxisUnit", "Dialect", "DriveSettings"]
 
 
 _PLACES: Final[Mapping[str, Mapping[str, object]]] = {
+    "write_value": {"name": "P250", "value": "-9999999.999999"},
     "record": {"n": 250, "text": "END"},
     "set_pointer": {"n": 250},
     "single_record": {"n": 250},
@@ -45,6 +47,8 @@ class Dialect:
     quit: str = "QUIT"
     home: str = "PH"
     make_valid: str = "VP"
+    write_value: str = "{name}={value}"
+    """How a parameter or variable is written: documented for the fieldbus (IBS p. 23)."""
     record: str = "N{n:03d}: {text}"
     """How a record is written: by the style of the listings (UG p. 95)."""
     set_pointer: str = "GOTO {n}"
@@ -111,6 +115,8 @@ class DriveSettings:
         message_form: What the drive answers to a command with ``$``; UNKNOWN lets the first move find out.
         error_pattern: Regular expression that finds an error in an answer; its one group is the code. The form of error
             replies stands on no page at hand.
+        xonxoff_weight: What P20 holds when Xon and Xoff are heeded; inferred from its documented values 3 and 19.
+        errors_suppressed_weight: And when the drive keeps quiet about errors.
         verify_messages: Ask the status before ``$`` is believed: for drives that send it after a stop or fault too.
         message_when_prepared: Ask for ``$`` also when a move is prepared with ``,``; whether a drive takes both signs
             on one line is not documented.
@@ -135,6 +141,8 @@ class DriveSettings:
     speed_limit_percent: float = 100.0
     message_form: MessageForm = MessageForm.UNKNOWN
     error_pattern: str = ERROR_PATTERN
+    xonxoff_weight: int = XONXOFF_BIT.weight
+    errors_suppressed_weight: int = ERRORS_SUPPRESSED_BIT.weight
     verify_messages: bool = False
     message_when_prepared: bool = False
     binary_settings: bool = False

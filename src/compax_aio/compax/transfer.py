@@ -6,6 +6,7 @@ import logging
 import re
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Final
 
 from ..errors import AnswerTimeoutError, CommandRejectedError, UnexpectedAnswerError
@@ -55,7 +56,12 @@ class Transfer:
         """Read P20, and do as it says: believe no prompt of a drive that keeps quiet about errors."""
         line = self._line
         try:
-            interface = await line.read(f"P{INTERFACE_PARAMETER}", decode_interface, Lane.CONTROL)
+            decode = partial(
+                decode_interface,
+                xonxoff_weight=line.settings.xonxoff_weight,
+                errors_suppressed_weight=line.settings.errors_suppressed_weight,
+            )
+            interface = await line.read(f"P{INTERFACE_PARAMETER}", decode, Lane.CONTROL)
         except (AnswerTimeoutError, CommandRejectedError, UnexpectedAnswerError) as error:
             _log.warning("%s does not give P20, so whether it tells errors is unknown: %s", line.name, error)
             return

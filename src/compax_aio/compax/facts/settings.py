@@ -57,6 +57,18 @@ SETTING_FACTS: Final = (
         certainty=Certainty.INFERRED,
     ),
     SettingFact(
+        name="xonxoff_weight",
+        meaning="what P20 holds when Xon and Xoff are heeded",
+        source="UG p. 166, 485 p. 6",
+        certainty=Certainty.INFERRED,
+    ),
+    SettingFact(
+        name="errors_suppressed_weight",
+        meaning="what P20 holds when the drive keeps quiet about errors",
+        source="UG p. 166",
+        certainty=Certainty.INFERRED,
+    ),
+    SettingFact(
         name="verify_messages",
         meaning="ask the status before $ is believed: for drives that send it after a stop or fault too",
         source="UG p. 160",
@@ -114,6 +126,12 @@ DIALECT_FACTS: Final = (
         name="make_valid",
         meaning="declares parameters valid",
         source="UG p. 158-159, CAN p. 32",
+        certainty=Certainty.INFERRED,
+    ),
+    SettingFact(
+        name="write_value",
+        meaning="how a parameter or variable {name} is written, with {value}",
+        source="IBS p. 23",
         certainty=Certainty.INFERRED,
     ),
     SettingFact(
