@@ -83,7 +83,7 @@ class AxisCommands:
                 f"the drive acknowledged power({state!r}), and its status does not show it",
                 device=self._line.name,
                 sent=word,
-                received=f"S16 {status.s16}, S17 {status.s17}",
+                received=status.as_sent,
                 hint="do not touch the axis; find out whether it has power",
                 exchanges=self._line.link.recent(),
             )

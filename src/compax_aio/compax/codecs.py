@@ -78,6 +78,16 @@ class DriveStatus:
     """RUN; False when off, or switched off by an error."""
     unused: bool
 
+    @property
+    def as_sent(self) -> str:
+        """Both as the drive sent them, for errors."""
+        return f"S16 {self.s16}, S17 {self.s17}"
+
+    @property
+    def shows_stop(self) -> bool:
+        """Whether the drive says that it was stopped, over the line or by input I6."""
+        return self.idle_after_stop or self.stopped_by_input
+
     @classmethod
     def decode(cls, s16: str, s17: str) -> DriveStatus:
         """

@@ -29,7 +29,7 @@ class Look:
     @property
     def as_sent(self) -> str:
         """The status as the drive sent it, for errors."""
-        return f"S16 {self.status.s16}, S17 {self.status.s17}"
+        return self.status.as_sent
 
 
 class Observer:

@@ -169,20 +169,20 @@ class ProgramRun:
         showed_stop, interval_s = self._showed_stop, self._line.settings.poll_first_s
         while _is_at_work(status := await self._observer.patiently(self._observer.read_status)):
             await self._refuse_fault(status, "a fault has come while the program runs")
-            showed_stop = _shows_stop(status)
+            showed_stop = status.shows_stop
             pause_s = interval_s if give_up_at is None else min(interval_s, give_up_at - loop.time())
             if pause_s <= 0:
                 raise MoveTimeoutError(
                     f"the program still runs after {timeout_s:g} s",
                     device=self._line.name,
-                    received=_as_sent(status),
+                    received=status.as_sent,
                     hint="wait longer, or stop() it",
                 )
             await asyncio.sleep(pause_s)
             interval_s = min(interval_s * _POLL_GROWTH, self._line.settings.poll_slowest_s)
         self._motion.untracked.note_over(mark)
         await self._refuse_fault(status, "a fault ended the program")
-        if _shows_stop(status):
+        if status.shows_stop:
             raise self._ended_by_stop(status, showed_before=showed_stop)
 
     # Before ---------------------------------------------------------------------------------------------------------
@@ -200,16 +200,16 @@ class ProgramRun:
         status = await self._observer.read_status()
         await self._refuse_fault(status, f"{text!r} was not sent, for the drive reports a fault")
         is_waiting = goes_on and status.ready_for_start
-        if (status.program_running and not is_waiting) or (status.command_active and not _shows_stop(status)):
+        if (status.program_running and not is_waiting) or (status.command_active and not status.shows_stop):
             raise self._busy(repr(text), status)
-        self._showed_stop = _shows_stop(status)
+        self._showed_stop = status.shows_stop
         return status
 
     def _busy(self, what: str, status: DriveStatus) -> MoveActiveError:
         return MoveActiveError(
             f"{'a program runs' if status.program_running else 'the axis moves'}, so {what} was not sent",
             device=self._line.name,
-            received=_as_sent(status),
+            received=status.as_sent,
             hint="wait_finished(), or break_off() what runs",
         )
 
@@ -220,7 +220,7 @@ class ProgramRun:
         raise DriveFaultError(
             f"{what}: {f'E{error.code}, {error.meaning}' if error else 'the drive does not say which'}",
             device=self._line.name,
-            received=_as_sent(status),
+            received=status.as_sent,
             hint=error.remedy if error else "read error_history(), mend the cause, then quit()",
             code=error.code if error else None,
             exchanges=self._line.link.recent(),
@@ -256,7 +256,7 @@ class ProgramRun:
             self._motion.note_doubt("nobody can say whether its program runs")
             raise self._doubt("the drive does not say whether its program runs", cause or error) from error
         waits_as_before = before.program_running and status.ready_for_start
-        return (status.program_running and not waits_as_before) or (status.command_active and not _shows_stop(status))
+        return (status.program_running and not waits_as_before) or (status.command_active and not status.shows_stop)
 
     async def _until_quiet(self, sent: str) -> None:
         loop = asyncio.get_running_loop()
@@ -269,7 +269,7 @@ class ProgramRun:
                     f"{'the program runs' if status.program_running else 'a command is active'}",
                     device=self._line.name,
                     sent=sent,
-                    received=_as_sent(status),
+                    received=status.as_sent,
                     hint="an IF STOP in the program may have taken over (CAN p. 59): break_off() it, or use the "
                     "emergency stop",
                 )
@@ -286,7 +286,7 @@ class ProgramRun:
         return MoveStoppedError(
             f"the program was stopped {by}",
             device=self._line.name,
-            received=_as_sent(status),
+            received=status.as_sent,
             hint="start() continues it, break_off() ends it for good",
         )
 
@@ -304,12 +304,4 @@ class ProgramRun:
 
 
 def _is_at_work(status: DriveStatus) -> bool:
-    return status.program_running or (status.command_active and not _shows_stop(status))
-
-
-def _shows_stop(status: DriveStatus) -> bool:
-    return status.idle_after_stop or status.stopped_by_input
-
-
-def _as_sent(status: DriveStatus) -> str:
-    return f"S16 {status.s16}, S17 {status.s17}"
+    return status.program_running or (status.command_active and not status.shows_stop)

@@ -251,7 +251,7 @@ class Pursuit:
             return status.machine_zero_approached
         if self._is_at_target(look.position):
             return True
-        if status.idle_after_stop or status.stopped_by_input:
+        if status.shows_stop:
             # The stop may be that of an earlier move, even of one to the same target.
             raise self._doubt(f"the drive was stopped at {self._observer.written(look.position)}", error)
         return self._is_at_target(await self._learn(self._observer.commanded_position, error))

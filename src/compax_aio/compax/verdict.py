@@ -36,6 +36,6 @@ def judge(status: DriveStatus, *, is_at_target: bool, finds_machine_zero: bool) 
         reached = status.position_reached and is_at_target
     if reached:
         return Verdict.REACHED
-    if status.idle_after_stop or status.stopped_by_input:
+    if status.shows_stop:
         return Verdict.STOPPED
     return Verdict.UNCLEAR
