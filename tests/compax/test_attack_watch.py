@@ -18,7 +18,15 @@ from tests.link.lines import Line, elapsed, unique_name
 from tests.promises.bench import bench, ending, now, scripted
 
 import compax_aio
-from compax_aio import AnswerTimeoutError, CompaxError, ConnectionLostError, Drive, DriveGroup, UnexpectedAnswerError
+from compax_aio import (
+    AnswerTimeoutError,
+    CompaxError,
+    ConnectionLostError,
+    Drive,
+    DriveGroup,
+    DriveSettings,
+    UnexpectedAnswerError,
+)
 from compax_aio.compax.events import Fault
 from compax_aio.compax.watch import Watch
 from compax_aio.simulator.clock import VirtualClockLoop
@@ -77,7 +85,7 @@ async def test_watchers_that_are_dropped_by_the_thousand_leave_nothing() -> None
 async def test_watchers_of_every_kind_end_whenever_the_drive_is_closed_or_lost() -> None:
     for milliseconds in range(0, 40, 3):
         for lose in (False, True):
-            async with bench(f"{milliseconds}{lose}") as (drive, far):
+            async with bench(f"{milliseconds}{lose}", settings=DriveSettings(reconnect=False)) as (drive, far):
                 watches = [
                     drive.watch("position"),
                     drive.watch("status", "error", interval_s=0.001),
@@ -90,7 +98,7 @@ async def test_watchers_of_every_kind_end_whenever_the_drive_is_closed_or_lost()
                 await asyncio.sleep(milliseconds / 1000)
                 if lose:
                     far.power_off()
-                    drive._line.link._abort()
+                    drive._line.link._port.hang_up()
                     await asyncio.sleep(0.01)
                 else:
                     await drive.close()

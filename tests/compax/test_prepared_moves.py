@@ -306,7 +306,7 @@ async def test_a_move_that_waits_for_its_trigger_learns_that_the_line_is_lost() 
     async with bench() as (drive, _):
         move = drive.prepare_move_to(100)
         await move.ready
-        drive._line.link._abort()
+        drive._line.link._port.hang_up()
         assert isinstance(await ending(move), ConnectionLostError)
 
 

@@ -261,7 +261,7 @@ async def test_a_start_behind_which_the_drive_falls_silent_is_in_doubt() -> None
 
 
 async def test_a_line_that_is_lost_behind_a_start_is_told_as_that() -> None:
-    async with scripted({"START": "?"}) as (drive, far):
+    async with scripted({"START": "?"}, settings=DriveSettings(reconnect=False)) as (drive, far):
 
         def hang_up(line: str) -> None:
             if "START" in far.lines and line[:2] == "S1":
@@ -436,7 +436,7 @@ async def test_a_drive_that_falls_silent_ends_the_wait() -> None:
 
 
 async def test_a_line_that_is_lost_ends_the_wait() -> None:
-    async with scripted({"S17": RUNS}) as (drive, far):
+    async with scripted({"S17": RUNS}, settings=DriveSettings(reconnect=False)) as (drive, far):
         asyncio.get_running_loop().call_later(1, far.transport.abort)
         assert isinstance(await ending(drive.program.wait_finished()), ConnectionLostError)
 

@@ -28,6 +28,8 @@ OF_ALL_KINDS = DriveSettings(
     message_form=MessageForm.FINAL_ONLY,
     verify_messages=True,
     resync_attempts=5,
+    reconnect=False,
+    reconnect_attempts=7,
     dialect=Dialect(stop="HALT", real_zero="SETZERO"),
 )
 
@@ -56,6 +58,8 @@ def any_settings(draw: st.DrawFn) -> DriveSettings:
     return DriveSettings(
         **values,
         resync_attempts=draw(st.integers(1, 10**6)),
+        reconnect=draw(st.booleans()),
+        reconnect_attempts=draw(st.none() | st.integers(1, 10**6)),
         unit=draw(texts),
         decimals=draw(st.sampled_from([2, 3])),
         units=draw(st.dictionaries(st.integers(-9, 99), axis_units, max_size=3)),

@@ -319,7 +319,7 @@ async def test_an_axis_that_does_not_come_to_rest_after_an_acknowledged_stop_is_
 async def test_a_line_that_is_lost_during_a_stop_leaves_the_move_in_doubt() -> None:
     far = SimulatedDrive()
     async with served_through(far, "bad", bytes) as url:
-        drive = await compax_aio.connect(url, name="x")
+        drive = await compax_aio.connect(url, name="x", settings=DriveSettings(reconnect=False))
         move = drive.move_to(10_000)
         await asyncio.sleep(1)
         far.deaf = True

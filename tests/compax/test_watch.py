@@ -19,6 +19,7 @@ from compax_aio import (
     ConnectionLostError,
     Drive,
     DriveGroup,
+    DriveSettings,
     InvalidCommandError,
     UnexpectedAnswerError,
 )
@@ -549,7 +550,7 @@ async def test_closing_the_drive_ends_every_watch_and_those_to_come() -> None:
 
 @pytest.mark.parametrize("at", [0.0005, 0.0013, 0.05, 0.0999, 0.1003])
 async def test_a_lost_line_is_raised_in_every_consumer(at: float) -> None:
-    async with scripted() as (drive, far):
+    async with scripted(settings=DriveSettings(reconnect=False)) as (drive, far):
         consumers = let_go_on(*(drive.watch("position", interval_s=interval_s) for interval_s in (0.1, 3600)))
         await asyncio.sleep(at)
         far.transport.abort()
@@ -563,7 +564,7 @@ async def test_a_lost_line_is_raised_in_every_consumer(at: float) -> None:
 
 
 async def test_a_reading_that_came_before_the_line_was_lost_is_seen_first() -> None:
-    async with scripted() as (drive, far):
+    async with scripted(settings=DriveSettings(reconnect=False)) as (drive, far):
         watch = drive.watch("position")
         await asyncio.sleep(0.1)
         far.transport.abort()
@@ -754,7 +755,7 @@ async def test_an_axis_that_falls_silent_shows_in_the_age_of_its_reading() -> No
 
 
 async def test_an_axis_that_is_lost_is_named() -> None:
-    async with bench("left") as (x, _), scripted() as (y, far):
+    async with bench("left") as (x, _), scripted(settings=DriveSettings(reconnect=False)) as (y, far):
         watch = DriveGroup(a=x, b=y).watch("position")
         await anext(watch)
         far.transport.abort()

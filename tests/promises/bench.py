@@ -134,6 +134,8 @@ class ScriptedDrive(asyncio.Protocol):
             "S17": "S017: 00000010",
             "S30": "S030: 0 0",
             "P20": "P020: 0",
+            "S18": "S018: 00 00 00 00 00 00 00 00",
+            **{f"S{number}": f"S{number:03}: SCRIPTED" for number in range(31, 40)},
             **(answers or {}),
         }
         self.lines: list[str] = []

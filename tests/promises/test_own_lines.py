@@ -107,5 +107,5 @@ async def test_a_drive_that_cannot_be_reached_delays_no_other_that_connects() ->
         return now()
 
     deaf_at, quick_at = await asyncio.gather(connect("deaf"), connect("quick"))
-    assert quick_at < 0.02
+    assert quick_at < 0.05
     assert deaf_at >= 3

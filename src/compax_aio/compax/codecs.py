@@ -25,6 +25,7 @@ __all__ = [
     "MonitorValue",
     "SerialInterface",
     "StatusValue",
+    "decode_codes",
     "decode_error",
     "decode_history",
     "decode_interface",
@@ -230,7 +231,7 @@ def decode_status_value(number: int, answer: str, axis_unit: str) -> StatusValue
     elif fact.form is Form.BITS:
         value = _bits(answer)
     elif fact.form in (Form.HISTORY, Form.PAIR):
-        value = tuple(_codes(answer))
+        value = tuple(decode_codes(answer))
     else:
         value = _number_or_text(raw)
     return StatusValue(
@@ -306,7 +307,7 @@ def decode_history(answer: str) -> tuple[HistoryEntry, ...]:
     """Decode S18, newest first; a mark (98, 99) stands before the error that it ended (UG p. 209)."""
     entries = []
     ended_by: str | None = None
-    for code in _codes(answer):
+    for code in decode_codes(answer):
         if code == HISTORY_ACKNOWLEDGED:
             ended_by = "acknowledged"
         elif code == HISTORY_POWERED_ON:
@@ -320,7 +321,7 @@ def decode_history(answer: str) -> tuple[HistoryEntry, ...]:
 
 def decode_error(answer: str) -> DeviceError | None:
     """Decode S30, one number or two in an order that is not documented: the first that is not zero (IBS p. 12)."""
-    return next((device_error(code) for code in _codes(answer) if code), None)
+    return next((device_error(code) for code in decode_codes(answer) if code), None)
 
 
 def _spelt(unit: str | None, axis_unit: str) -> str | None:
@@ -340,8 +341,9 @@ def _bits(answer: str) -> str:
     return text
 
 
-def _codes(answer: str) -> list[int]:
+def decode_codes(answer: str) -> tuple[int, ...]:
+    """Return the codes and marks of S18, newest first, or of S30, as they are (UG p. 209)."""
     codes = re.findall(r"\d+", value_text(answer))
     if not codes:
         raise UnexpectedAnswerError("the answer holds no error code (UG p. 209)", received=answer)
-    return [int(code) for code in codes]
+    return tuple(map(int, codes))

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Iterable
 from types import TracebackType
 from typing import Self, Unpack
 
 from ..errors import ConnectionLostError, InvalidCommandError
 from ..link.cancellation import despite_cancellation
-from ..link.contract import Event
+from ..link.contract import Event, Lane
 from ..link.link import LinkStats
+from ..link.reconnecting import Restored
 from .axis import AxisCommands
 from .codecs import DriveStatus, SerialInterface
 from .events import (
     ComparatorPassed,
     ConnectionLost,
+    ConnectionRestored,
     EventHub,
     EventStream,
     Fault,
@@ -23,6 +26,7 @@ from .events import (
     UnexpectedText,
 )
 from .facts.device_errors import DeviceError
+from .identity import Identity
 from .line import DriveLine
 from .motion import Motion
 from .moves import Move, OnCancel, PreparedMove
@@ -47,6 +51,8 @@ from .watch import Watch
 
 __all__ = ["Drive"]
 
+_log = logging.getLogger("compax_aio.compax")
+
 
 class Drive(Readings, AxisCommands):
     """
@@ -66,8 +72,18 @@ class Drive(Readings, AxisCommands):
         self.name = name
         self._events = EventHub()
         self._loop = asyncio.get_running_loop()
-        line = DriveLine(name, settings, self._on_event, self._on_lost)
+        line = DriveLine(
+            name,
+            settings,
+            on_event=self._on_event,
+            on_lost=self._on_lost,
+            greet=self._greet,
+            on_down=self._on_down,
+            on_restored=self._on_restored,
+        )
         super().__init__(line, Observer(line, self._on_fault))
+        self._identity = Identity(line)
+        self._signs_of_restart: tuple[str, ...] = ()
         self._motion = Motion(self._observer)
         self.parameters = Parameters(line)
         self.variables = NumberedValues(line, VARIABLE_TABLE)
@@ -76,12 +92,18 @@ class Drive(Readings, AxisCommands):
 
     async def _open(self, url: str) -> None:
         await self._line.link.open(url)
-        try:
-            await self._motion.look_around()
-            await self._line.transfer.read_interface()
-        except BaseException:
-            await self._line.link.close()
-            raise
+
+    async def _greet(self) -> None:
+        """Look who is there and how it stands, before anything that can move is sent."""
+        signs = []
+        was_homed, is_homing = self._observer.is_homed, self._motion.is_homing
+        status = await self._motion.look_around()
+        if status is not None and was_homed and not status.machine_zero_approached and not is_homing:
+            signs.append("machine zero is not approached any more (S16 bit 3)")
+        await self._line.transfer.read_interface(Lane.GREETING)
+        if self.settings.reconnect and await self._identity.check():
+            signs.append("the error history has a new power-on mark (S18)")
+        self._signs_of_restart = tuple(signs)
 
     def __repr__(self) -> str:
         return f"<Drive {self.name} {'open' if self.is_open else 'closed'}>"
@@ -304,7 +326,7 @@ class Drive(Readings, AxisCommands):
 
     @property
     def is_open(self) -> bool:
-        """Whether the line is there."""
+        """Whether the line is there, and known to lead to this drive; not while it is lost and tried again."""
         return self._line.link.is_open
 
     async def close(self) -> None:
@@ -320,10 +342,12 @@ class Drive(Readings, AxisCommands):
 
     async def _close(self) -> None:
         try:
-            if self.is_open:
+            if not self._line.link.is_over:
                 await self._motion.end()
         except ConnectionLostError:
-            pass  # whoever awaited the move has been told
+            if not self._line.link.is_over:
+                raise
+            # Else whoever awaited the move has been told.
         finally:
             await self._line.link.close()
             self._events.end()
@@ -341,18 +365,41 @@ class Drive(Readings, AxisCommands):
 
     def _on_event(self, event: Event) -> None:
         at = self._loop.time()
+        # As long as it is not known who is there, a message ends no move of ours.
+        is_known = self._line.link.is_open
         if isinstance(event, PositionReached):
             self._events.publish(PositionMessage(self.name, at))
-            self._motion.position_reached()
+            if is_known:
+                self._motion.position_reached()
         elif isinstance(event, ComparatorReached):
             self._events.publish(ComparatorPassed(self.name, at, event.number))
-            self._motion.comparator_reached(event.number)
+            if is_known:
+                self._motion.comparator_reached(event.number)
         elif isinstance(event, Stray):
             self.stats.strays += 1
             self._events.publish(UnexpectedText(self.name, at, event.text))
 
     def _on_fault(self, error: DeviceError | None) -> None:
         self._events.publish(Fault(self.name, self._loop.time(), error))
+
+    def _on_down(self, error: ConnectionLostError) -> None:
+        self._events.publish(ConnectionLost(self.name, self._loop.time(), str(error)))
+        self._motion.line_lost(error)
+
+    def _on_restored(self, restored: Restored) -> None:
+        if self._signs_of_restart:
+            _log.warning(
+                "%s seems to have been switched off and on: %s; prepared points, SPEED, ramps and the position "
+                "reference may be gone",
+                self.name,
+                " and ".join(self._signs_of_restart),
+            )
+        self._events.publish(
+            ConnectionRestored(
+                self.name, self._loop.time(), restored.after_s, restored.attempts, self._signs_of_restart
+            )
+        )
+        self._motion.line_restored(self._signs_of_restart)
 
     def _on_lost(self, error: ConnectionLostError) -> None:
         self._events.publish(ConnectionLost(self.name, self._loop.time(), str(error)))

@@ -14,6 +14,7 @@ from .facts.device_errors import DeviceError
 __all__ = [
     "ComparatorPassed",
     "ConnectionLost",
+    "ConnectionRestored",
     "DriveEvent",
     "EventHub",
     "EventStream",
@@ -56,9 +57,25 @@ class Fault(DriveEvent):
 
 @dataclass(frozen=True, slots=True)
 class ConnectionLost(DriveEvent):
-    """The line went away."""
+    """The line went away; it is tried again, unless ``DriveSettings.reconnect`` says otherwise."""
 
     reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class ConnectionRestored(DriveEvent):
+    """A line that was lost is back, and the same drive is on it, as far as it says who it is."""
+
+    lost_for_s: float
+    attempts: int
+    """How often the line was tried."""
+    signs_of_restart: tuple[str, ...]
+    """
+    What shows that the drive was switched off and on meanwhile; empty proves nothing.
+
+    Prepared points, SPEED, ramps and the position reference may be gone then. SPEED and ramps that were said from here
+    are said again before the next motion, in any case.
+    """
 
 
 @dataclass(frozen=True, slots=True)

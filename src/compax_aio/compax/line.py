@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from math import inf
 from typing import TypeVar
 
 from ..errors import AnswerTimeoutError, CommandRejectedError, ConnectionLostError, UnexpectedAnswerError
 from ..link.contract import Event, Lane, TurnOver
 from ..link.link import Link
+from ..link.reconnecting import Backoff, Reconnecting, Restored
 from .codecs import DriveStatus, decode_number, shows_active
 from .facts.device_errors import device_error
 from .protocol import Acknowledged, Answered, CompaxProtocol, Rejected, UnexpectedAnswer
@@ -29,15 +30,22 @@ class DriveLine:
         name: Of the drive.
         settings: Time-outs and what is known of the drive's ways.
         on_event: Called with messages and strays as they are read.
-        on_lost: Called when the line goes away.
+        on_lost: Called when the line goes away for good.
+        greet: Looks who is on a line that was opened; see :class:`~compax_aio.link.link.Link`.
+        on_down: Called when the line goes away, and is tried again.
+        on_restored: Called when it is back.
     """
 
     def __init__(
         self,
         name: str,
         settings: DriveSettings,
+        *,
         on_event: Callable[[Event], None],
         on_lost: Callable[[ConnectionLostError], None],
+        greet: Callable[[], Awaitable[None]],
+        on_down: Callable[[ConnectionLostError], None],
+        on_restored: Callable[[Restored], None],
     ) -> None:
         self.name = name
         self.settings = settings
@@ -49,6 +57,8 @@ class DriveLine:
             resync_attempts=settings.resync_attempts,
             on_event=on_event,
             on_lost=on_lost,
+            greet=greet,
+            reconnecting=_reconnecting(name, settings, on_down, on_restored),
         )
         self.last_position: float | None = None
         self.active_seen_at = -inf
@@ -64,7 +74,7 @@ class DriveLine:
             UnexpectedAnswerError: It acknowledged a question instead of answering it.
             AnswerTimeoutError, ConnectionLostError: No answer came.
         """
-        outcome = await self.link.exchange(text, lane)
+        outcome = await self.link.exchange(text, lane, survives_loss=True)
         if isinstance(outcome, Answered):
             return outcome.text
         raise self.error_of(text, outcome)
@@ -88,22 +98,26 @@ class DriveLine:
             AnswerTimeoutError, ConnectionLostError: Whether it was accepted is unknown.
         """
         wire = self.protocol.encode(text)
+        is_written = False
 
         def written() -> None:
+            nonlocal is_written
+            is_written = True
             self.transfer.note_sent(text)
             if on_sent is not None:
                 on_sent()
 
         try:
             outcome = await self.exchange(text, lane, written)
-        except AnswerTimeoutError:
-            self.transfer.note_lost(text, wire)
+        except (AnswerTimeoutError, ConnectionLostError):
+            if is_written:
+                self.transfer.note_lost(text, wire)
             raise
         if not isinstance(outcome, Acknowledged):
             raise self.error_of(text, outcome)
         self.transfer.note_taken(text)
         if text == self.settings.dialect.make_valid and self.transfer.interface is None:
-            await self.transfer.read_interface()
+            await self.transfer.read_interface(Lane.CONTROL)
 
     async def read(self, text: str, decode: Callable[[str], _Value], lane: Lane = Lane.READ) -> _Value:
         """Ask, and decode the answer; an answer that cannot be decoded is told with the drive and its exchanges."""
@@ -127,8 +141,8 @@ class DriveLine:
         return self._decoded(lambda answer: DriveStatus.decode(answer, s17), s16)
 
     def exchange(self, text: str, lane: Lane, on_sent: Callable[[], None] | None = None) -> asyncio.Future[TurnOver]:
-        """Queue *text*, written at once if the line is free; see :meth:`Link.exchange`."""
-        return self.link.exchange(text, lane, settles_late=True, on_sent=on_sent)
+        """Queue *text*, written at once if the line is free; only a stop waits for one that is lost."""
+        return self.link.exchange(text, lane, settles_late=True, survives_loss=lane is Lane.STOP, on_sent=on_sent)
 
     def error_of(self, text: str, outcome: TurnOver) -> CommandRejectedError | UnexpectedAnswerError:
         """Turn an answer that is no success into the error that says so."""
@@ -160,3 +174,19 @@ class DriveLine:
             error.device = self.name
             error.exchanges = self.link.recent()
             raise
+
+
+def _reconnecting(
+    name: str,
+    settings: DriveSettings,
+    on_down: Callable[[ConnectionLostError], None],
+    on_restored: Callable[[Restored], None],
+) -> Reconnecting | None:
+    if not settings.reconnect:
+        return None
+    backoff = Backoff(
+        first_s=settings.reconnect_first_s,
+        slowest_s=settings.reconnect_slowest_s,
+        attempts=settings.reconnect_attempts,
+    )
+    return Reconnecting(name, backoff, settings.in_doubt_after_s, on_down, on_restored)

@@ -197,6 +197,7 @@ class Motion:
             await asyncio.wait([self._stopping])
         self.refuse_second(repr(text))
         self._refuse_in_doubt(repr(text))
+        await self._observer.line.transfer.say_settings(())
         if self.stops != stops:
             raise self._reports.taken_back(text)
         await self.untracked.tell(text)
@@ -255,18 +256,34 @@ class Motion:
         else:
             self._active.look_now()
 
+    def line_restored(self, signs_of_restart: tuple[str, ...]) -> None:
+        """Let a move that is under way find its fate; before the next, settings are said again."""
+        self._observer.line.transfer.forget_taken()
+        if self._active is not None:
+            self._active.line_restored(signs_of_restart)
+
+    @property
+    def is_homing(self) -> bool:
+        """Whether a search for machine zero may be under way from here."""
+        return self._active is not None and self._active.move.is_on_wire and self._active.move.plan.finds_machine_zero
+
     async def read_position(self) -> float:
         """Read S1."""
         return await self._observer.line.position()
 
-    async def look_around(self) -> None:
-        """Find out whether somebody's motion runs already: the ``$`` that ends it is not one of ours."""
+    async def look_around(self) -> DriveStatus | None:
+        """
+        Find out whether a motion runs: the ``$`` that ends somebody else's is not one of ours.
+
+        On a line that came back: one that was sent before the answer to this came before it, or is lost.
+        """
         try:
-            status = await self._observer.read_status()
+            status = await self._observer.read_status(Lane.GREETING)
         except (CommandRejectedError, UnexpectedAnswerError) as error:
             _log.warning("%s does not say how it stands: %s", self.name, error)
-        else:
-            self._memory.messages_owed = int(status.command_active)
+            return None
+        self._memory.messages_owed = int(status.command_active)
+        return status
 
     async def reconcile(self) -> DriveStatus:
         """Read status and position, and end the doubt; a line that is held goes on by the caller's word."""

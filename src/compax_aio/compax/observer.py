@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from typing import TypeVar
 
-from ..errors import AnswerTimeoutError, CommandRejectedError, CompaxError, ConnectionLostError, UnexpectedAnswerError
+from ..errors import AnswerTimeoutError, CommandRejectedError, CompaxError, UnexpectedAnswerError
 from ..link.contract import Lane
 from .codecs import DriveStatus, decode_error
 from .facts.device_errors import FAULT_CODES, DeviceError
@@ -45,21 +45,24 @@ class Observer:
         self.line = line
         self._on_fault = on_fault
         self._faulted = False
+        self.is_homed = False
+        """Whether machine zero had been approached when the status was read last (S16 bit 3, UG p. 209)."""
 
     async def read_status(self, lane: Lane = Lane.CONTROL) -> DriveStatus:
         """Read S16 and S17; a fault they show is told to whoever follows the drive's events."""
         status = await self.line.status(lane)
-        await self.note(no_fault=status.no_fault)
+        self.is_homed = status.machine_zero_approached
+        await self.note(no_fault=status.no_fault, lane=Lane.GREETING if lane is Lane.GREETING else Lane.CONTROL)
         return status
 
-    async def note(self, *, no_fault: bool) -> None:
+    async def note(self, *, no_fault: bool, lane: Lane = Lane.CONTROL) -> None:
         """Take note of S16 bit 1; a fault that is new is told to whoever follows the drive's events."""
         if no_fault:
             self._faulted = False
         elif not self._faulted:
             self._faulted = True
             try:
-                error = await self.read_error()
+                error = await self.read_error(lane)
             except BaseException:
                 self._faulted = False  # the next look tells it
                 raise
@@ -71,10 +74,10 @@ class Observer:
             self._faulted = True
             self._on_fault(error)
 
-    async def read_error(self) -> DeviceError | None:
+    async def read_error(self, lane: Lane = Lane.CONTROL) -> DeviceError | None:
         """Read S30; None also where the drive does not say, or cannot be heard: the fault itself is known already."""
         try:
-            return await self.line.read("S30", decode_error, Lane.CONTROL)
+            return await self.line.read("S30", decode_error, lane)
         except (AnswerTimeoutError, CommandRejectedError, UnexpectedAnswerError):
             return None
 
@@ -94,10 +97,8 @@ class Observer:
         while True:
             try:
                 return await read()
-            except ConnectionLostError:
-                raise
             except CompaxError:
-                if loop.time() >= give_up_at:
+                if self.line.link.is_over or loop.time() >= give_up_at:
                     raise
             await asyncio.sleep(self.line.settings.poll_first_s)
 

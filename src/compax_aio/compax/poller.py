@@ -89,6 +89,7 @@ class Poller:
         self, line: DriveLine, readings: Readings, parameters: NumberedValues, variables: NumberedValues
     ) -> None:
         self._name = line.name
+        self._link = line.link
         self._stats = line.link.stats
         self._readings = readings
         self._parameters = parameters
@@ -199,8 +200,8 @@ class Poller:
                     self._serve(quantity)
                     if self._is_watched:
                         await self._give_way(self._loop.time() - begun_at)
-        except ConnectionLostError:
-            pass  # the drive tells all who watch, or has done so
+        except CompaxError:
+            pass  # the line is over: the drive tells all who watch, or has done so
         except BaseException as error:
             # A defect, or somebody who cancels every task there is: nobody shall wait for ever.
             if self._task is asyncio.current_task():
@@ -236,9 +237,9 @@ class Poller:
         self._is_reading = True
         try:
             value = await quantity.read()
-        except ConnectionLostError:
-            raise
         except CompaxError as failure:
+            if self._link.is_over:
+                raise
             error = failure.with_traceback(None)
             if quantity.error is None:
                 _log.warning("%s: %s cannot be read: %s", self._name, quantity.name, error)

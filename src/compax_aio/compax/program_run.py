@@ -232,7 +232,9 @@ class ProgramRun:
         """Send what starts a program, once; where the answer proves nothing, the status decides."""
         try:
             await self._motion.tell(text, unless_stopped_since=stops)
-        except (AnswerTimeoutError, UnexpectedAnswerError) as error:
+        except (AnswerTimeoutError, ConnectionLostError, UnexpectedAnswerError) as error:
+            if self._line.link.is_over:
+                raise
             if not await self._has_begun(before, error):
                 error.hint = (
                     "the status shows no program running: it was not taken, or what it started is over already; "
@@ -250,9 +252,9 @@ class ProgramRun:
     async def _has_begun(self, before: DriveStatus, cause: CompaxError | None) -> bool:
         try:
             status = await self._observer.patiently(self._observer.read_status)
-        except ConnectionLostError:
-            raise
         except CompaxError as error:
+            if self._line.link.is_over:
+                raise
             self._motion.note_doubt("nobody can say whether its program runs")
             raise self._doubt("the drive does not say whether its program runs", cause or error) from error
         waits_as_before = before.program_running and status.ready_for_start

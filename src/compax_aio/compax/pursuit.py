@@ -77,6 +77,8 @@ class Pursuit:
         self._reply: asyncio.Future[TurnOver] | None = None
         self._stored: _Stored | None = None
         self._sent_as_frame = False
+        self._signs_of_restart: tuple[str, ...] = ()
+        self._line_was_lost = False
 
     async def carry_out(self) -> None:
         """
@@ -166,8 +168,8 @@ class Pursuit:
         self._line.link.release_reads()
         try:
             outcome = await self._reply
-        except AnswerTimeoutError as error:
-            if not self.move.is_on_wire:
+        except (AnswerTimeoutError, ConnectionLostError) as error:
+            if not self.move.is_on_wire or self._line.link.is_over:
                 raise
             await self._find_out(error)
             return
@@ -228,6 +230,7 @@ class Pursuit:
         look = await self._look(error)
         status = look.status
         self._was_seen_active |= status.command_active
+        self._refuse_after_restart(error)
         if not status.no_fault:
             self._points_may_be_left()
             raise self._reports.fault(self.move, look, await self._observer.read_error())
@@ -278,6 +281,17 @@ class Pursuit:
         """Look at once: something has happened to the line."""
         self._wake.set()
 
+    def line_restored(self, signs_of_restart: tuple[str, ...]) -> None:
+        """Look at once, now that the line is back; a drive that was switched off cannot say how the move ended."""
+        self._signs_of_restart += signs_of_restart
+        self._line_was_lost = True
+        self._wake.set()
+
+    def _refuse_after_restart(self, cause: CompaxError | None) -> None:
+        if self._signs_of_restart:
+            signs = " and ".join(self._signs_of_restart)
+            raise self._doubt(f"the drive seems to have been switched off and on: {signs}", cause)
+
     def _was_acknowledged_by_prompt(self) -> bool:
         """Whether the motion's own prompt was read, if only in the same piece of bytes as its ``$``."""
         reply = self._reply
@@ -299,6 +313,10 @@ class Pursuit:
             if self.move.done():
                 return
             self._was_seen_active |= look.status.command_active
+            self._refuse_after_restart(None)
+            if self._line_was_lost:
+                self._line_was_lost = False
+                pace = Pace(self._settings, self._loop.time())  # nobody knows for how long it has stood still
             verdict = self._judge(look)
             if verdict is Verdict.UNCLEAR:
                 unclear += 1
@@ -399,11 +417,11 @@ class Pursuit:
     async def _learn(self, read: Callable[[], Awaitable[_Value]], cause: CompaxError | None) -> _Value:
         try:
             return await self._observer.patiently(read)
-        except ConnectionLostError:
-            raise
         except CompaxError as error:
+            if self._line.link.is_over:
+                raise
             raise self._doubt("the drive does not say how it stands", cause or error) from error
 
-    def _doubt(self, why: str, cause: CompaxError) -> MoveInDoubtError:
+    def _doubt(self, why: str, cause: CompaxError | None) -> MoveInDoubtError:
         self._memory.doubt = f"{self.move.plan.description} is in doubt: {why}"
         return self._reports.in_doubt(self.move, why, cause)

@@ -114,13 +114,13 @@ class Reports:
             exchanges=self._observer.line.link.recent(),
         )
 
-    def in_doubt(self, move: Move, why: str, cause: CompaxError) -> MoveInDoubtError:
+    def in_doubt(self, move: Move, why: str, cause: CompaxError | None) -> MoveInDoubtError:
         """Report a move of which nobody can say what became of it."""
         error = MoveInDoubtError(
             f"what became of {move.plan.description} is in doubt: {why}",
             device=self._name,
             sent=move.sent,
-            received=cause.received,
+            received=cause.received if cause is not None else None,
             hint="look at the machine, then call reconcile(); until then this drive takes no motion from here",
             exchanges=self._observer.line.link.recent(),
         )

@@ -107,6 +107,10 @@ class DriveSettings:
     Attributes:
         answer_timeout_s: How long an answer may take before the line is in doubt and is brought back in step.
         resync_attempts: How many status queries are tried to get back in step before the drive counts as silent.
+        reconnect: Open a line that was lost, or that keeps silent, again; moves under way survive that.
+        reconnect_first_s: The first attempt comes so soon at most, each later one after twice the time …
+        reconnect_slowest_s: … up to this; a random part of it, so that many lines are not tried all at once.
+        reconnect_attempts: How often a lost line is tried; None: until it is back.
         unit: Name of the unit chosen with P90, for people; the drive does not send it.
         decimals: Of positions and distances: 2, or 3 where the unit is inches (UG p. 100).
         units: What the values of P90 mean on this drive, for :meth:`Drive.read_axis`; no page at hand says it.
@@ -126,7 +130,8 @@ class DriveSettings:
         poll_first_s: A pending move's status is asked for the first time after this, then ever more rarely …
         poll_slowest_s: … down to one look in this many seconds.
         stall_timeout_s: A move whose axis stands still for so long, while its command is active, has failed.
-        in_doubt_after_s: A pending move of which nothing can be learnt for so long is in doubt.
+        in_doubt_after_s: A pending move of which nothing can be learnt for so long is in doubt; what asks the drive
+            something waits for a lost line as long.
         stop_timeout_s: How long STOP is repeated until it is acknowledged.
         standstill_timeout_s: How long an acknowledged STOP may take to bring the axis to a standstill.
         dialect: Words that may differ.
@@ -134,6 +139,10 @@ class DriveSettings:
 
     answer_timeout_s: float = 1.0
     resync_attempts: int = 3
+    reconnect: bool = True
+    reconnect_first_s: float = 0.2
+    reconnect_slowest_s: float = 5.0
+    reconnect_attempts: int | None = None
     unit: str = "units"
     decimals: int = POSITION_DECIMALS
     units: Mapping[int, AxisUnit] = field(default_factory=dict)
@@ -178,10 +187,9 @@ class DriveSettings:
                 f"not {self.speed_limit_percent!r}"
             )
         _check_error_pattern(self.error_pattern)
-        if type(self.resync_attempts) is not int or self.resync_attempts < 1:
-            raise InvalidCommandError(
-                f"resync_attempts must be a whole number and at least 1, not {self.resync_attempts!r}"
-            )
+        _check_attempts("resync_attempts", self.resync_attempts)
+        if self.reconnect_attempts is not None:
+            _check_attempts("reconnect_attempts", self.reconnect_attempts)
 
     @classmethod
     def load(cls, path: str | Path) -> DriveSettings:
@@ -222,6 +230,8 @@ def _is_of_kind(name: str, value: object, default: object) -> bool:
         return isinstance(value, Mapping) and all(
             type(code) is int and isinstance(unit, AxisUnit) for code, unit in value.items()
         )
+    if name == "reconnect_attempts":
+        return value is None or _is_number(value)
     if name == "travel":
         return value is None or (isinstance(value, tuple | list) and all(map(_is_number, value)))
     if name == "dialect":
@@ -231,6 +241,11 @@ def _is_of_kind(name: str, value: object, default: object) -> bool:
 
 def _is_number(value: object) -> bool:
     return isinstance(value, Real) and not isinstance(value, bool)
+
+
+def _check_attempts(name: str, attempts: object) -> None:
+    if type(attempts) is not int or attempts < 1:
+        raise InvalidCommandError(f"{name} must be a whole number and at least 1, not {attempts!r}")
 
 
 def _check_error_pattern(pattern: str) -> None:

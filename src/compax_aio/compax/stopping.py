@@ -66,8 +66,10 @@ class Stop:
         give_up_at = self._loop.time() + self._settings.stop_timeout_s
         while True:
             try:
-                outcome = await self._reply
-            except AnswerTimeoutError as error:
+                outcome = await self._answer(give_up_at)
+            except (AnswerTimeoutError, ConnectionLostError) as error:
+                if self._observer.line.link.is_over:
+                    raise
                 failure: CompaxError = error
             else:
                 if isinstance(outcome, Acknowledged):
@@ -83,12 +85,26 @@ class Stop:
             await asyncio.sleep(_PAUSE_S)
             self._reply = self._send()
 
+    async def _answer(self, give_up_at: float) -> TurnOver:
+        """Await the answer to STOP; while the line is lost, no longer than until *give_up_at*."""
+        link = self._observer.line.link
+        await asyncio.wait([self._reply], timeout=max(give_up_at - self._loop.time(), 0.0))
+        if not self._reply.done() and not link.is_open:
+            self._reply.cancel()
+            raise ConnectionLostError(
+                "the line is lost",
+                device=self._observer.line.name,
+                hint=_HINT,
+                exchanges=link.recent(),
+            )
+        return await self._reply
+
     async def _has_nothing_to_stop(self) -> bool:
         try:
             status = await self._observer.read_status()
-        except ConnectionLostError:
-            raise
         except CompaxError:
+            if self._observer.line.link.is_over:
+                raise
             return False
         return not status.command_active and not status.program_running
 
@@ -97,11 +113,9 @@ class Stop:
         while True:
             try:
                 look = await self._observer.look()
-            except ConnectionLostError:
-                raise
             except CompaxError:
                 # One answer lost is no reason to give up a stop that was acknowledged.
-                if self._loop.time() >= give_up_at:
+                if self._observer.line.link.is_over or self._loop.time() >= give_up_at:
                     raise
                 continue
             status = look.status

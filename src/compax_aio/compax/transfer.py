@@ -44,6 +44,8 @@ class Transfer:
         self._line = line
         self._unsure: dict[str, str | None] = {}
         """By word, what was said of a setting last, or None for nothing; the drive may have taken another value."""
+        self._said: dict[str, str] = {}
+        """By word, what the drive has acknowledged of a setting last."""
 
     # P20 ------------------------------------------------------------------------------------------------------------
 
@@ -52,7 +54,7 @@ class Transfer:
         """Whether P20 is known to let the drive tell errors; if not, a prompt proves nothing (UG p. 166)."""
         return self.interface is not None and not self.interface.errors_suppressed
 
-    async def read_interface(self) -> None:
+    async def read_interface(self, lane: Lane) -> None:
         """Read P20, and do as it says: believe no prompt of a drive that keeps quiet about errors."""
         line = self._line
         try:
@@ -61,9 +63,11 @@ class Transfer:
                 xonxoff_weight=line.settings.xonxoff_weight,
                 errors_suppressed_weight=line.settings.errors_suppressed_weight,
             )
-            interface = await line.read(f"P{INTERFACE_PARAMETER}", decode, Lane.CONTROL)
+            interface = await line.read(f"P{INTERFACE_PARAMETER}", decode, lane)
         except (AnswerTimeoutError, CommandRejectedError, UnexpectedAnswerError) as error:
             _log.warning("%s does not give P20, so whether it tells errors is unknown: %s", line.name, error)
+            return
+        if interface == self.interface:
             return
         self.interface = interface
         if interface.errors_suppressed:
@@ -113,7 +117,13 @@ class Transfer:
 
     def note_taken(self, text: str) -> None:
         """Take note of a line that the drive has acknowledged."""
-        self._unsure.pop(_word(text), None)
+        if word := _word(text):
+            self._unsure.pop(word, None)
+            self._said[word] = text
+
+    def forget_taken(self) -> None:
+        """Take note that the drive may have been without power: what it was told of settings is to be said again."""
+        self._unsure = {**self._said, **self._unsure}
 
     def note_lost(self, text: str, wire: bytes) -> None:
         """Take note of a line whose acknowledgement did not come, and that went out as *wire*."""
@@ -136,7 +146,8 @@ class Transfer:
         """
         Say SPEED and ramps, each until the drive has acknowledged it.
 
-        Those that binary has left in doubt go first, as text, unless *lines* say them anew: twice they do no harm.
+        Those that are in doubt go first, as text where binary has left them so, unless *lines* say them anew: twice
+        they do no harm.
 
         Raises:
             CommandRejectedError, UnexpectedAnswerError, AnswerTimeoutError, ConnectionLostError: One was not taken.

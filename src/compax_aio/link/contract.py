@@ -24,9 +24,11 @@ class Lane(IntEnum):
     """What goes first when the line is free; inside a lane, first come first served."""
 
     STOP = 0
-    CONTROL = 1
-    MOTION = 2
-    READ = 3
+    GREETING = 1
+    """The look at who is there, on a line that was opened: all that is less urgent waits for it."""
+    CONTROL = 2
+    MOTION = 3
+    READ = 4
 
 
 @dataclass(frozen=True, slots=True)

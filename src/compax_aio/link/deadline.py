@@ -21,12 +21,15 @@ class Deadline:
         self._after_s = after_s
         self._when_over = when_over
         self._loop = asyncio.get_running_loop()
+        self.counted_from = 0.0
+        """Loop time at which it was put off last."""
         self._at = 0.0
         self._timer: asyncio.TimerHandle | None = None
 
     def put_off(self) -> None:
         """Count from now."""
-        self._at = self._loop.time() + self._after_s
+        self.counted_from = self._loop.time()
+        self._at = self.counted_from + self._after_s
         if self._timer is None:
             self._timer = self._loop.call_at(self._at, self._wake)
 

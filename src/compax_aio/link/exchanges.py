@@ -18,14 +18,21 @@ class Exchange:
     """One line to be sent, and who waits for its answer."""
 
     text: str
+    lane: Lane
     settles_late: bool = False
     """Whether those who wait do so, after a time-out, until the line is in step: the answer may come late."""
+    survives_loss: bool = False
+    """Whether it waits for a line that is lost, and may be sent again on it: it asks something, or stops."""
+    attempt: int = 0
+    """How often the line had been opened when it was queued."""
     on_sent: Callable[[], None] | None = None
     waiters: list[asyncio.Future[TurnOver]] = field(default_factory=list)
     times_ahead: int = 0
     """How often it was sent although in doubt."""
     is_late: bool = False
     """Whether it was sent in its turn, and its time has run out."""
+    is_on_wire: bool = False
+    """Whether it was sent in its turn."""
     received: str | None = None
     """What had come until then."""
 
@@ -33,6 +40,11 @@ class Exchange:
     def is_wanted(self) -> bool:
         """Whether anybody waits for it."""
         return any(not waiter.done() for waiter in self.waiters)
+
+    def begin_anew(self) -> None:
+        """Forget that it was sent: the line on which it was is lost."""
+        self.is_on_wire = self.is_late = False
+        self.received = None
 
     def end(self, outcome: TurnOver) -> None:
         """Give *outcome* to all who wait."""
@@ -53,22 +65,24 @@ class ExchangeQueue:
     def __init__(self) -> None:
         self.reads_are_held = False
         """While set, reads stay where they are; everything else goes on."""
+        self.is_admitted = True
+        """Unless set, nothing goes that is less urgent than the look at who is there."""
         self._lanes: tuple[deque[Exchange], ...] = tuple(deque() for _ in Lane)
         self._reads: dict[str, Exchange] = {}
 
-    def put(self, exchange: Exchange, lane: Lane) -> None:
+    def put(self, exchange: Exchange) -> None:
         """Queue *exchange*; a read joins another of the same text that waits already."""
-        if lane is Lane.READ:
+        if exchange.lane is Lane.READ:
             if (shared := self._reads.get(exchange.text)) is not None:
                 shared.waiters += exchange.waiters
                 return
             self._reads[exchange.text] = exchange
-        self._lanes[lane].append(exchange)
+        self._lanes[exchange.lane].append(exchange)
 
     def take_next(self) -> Exchange | None:
         """Take out what is to be sent next; what nobody waits for any more is dropped."""
         for lane in Lane:
-            if lane is Lane.READ and self.reads_are_held:
+            if (lane is Lane.READ and self.reads_are_held) or (lane > Lane.GREETING and not self.is_admitted):
                 return None
             waiting = self._lanes[lane]
             while waiting:

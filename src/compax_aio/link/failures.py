@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from ..errors import AnswerTimeoutError, ConnectionLostError, UnexpectedAnswerError
+from copy import copy
+
+from ..errors import AnswerTimeoutError, CompaxError, ConnectionLostError, UnexpectedAnswerError
 from .contract import Hold, Stranger
 from .exchanges import Exchange
 from .wire import WireHistory
@@ -87,25 +89,47 @@ class Failures:
             exchanges=self._history.lines(),
         )
 
+    def refused(self, error: CompaxError, exchange: Exchange | None) -> CompaxError:
+        """Say why a line that came back is not used; each who waits gets an error of its own."""
+        mine = copy(error)
+        mine.__cause__ = error
+        if exchange is not None:
+            mine.what = f"{exchange.text!r} was not sent on the line that came back: {error.what}"
+        return mine
+
     def loss(
-        self, exchange: Exchange | None, cause: Exception | None, *, is_closing: bool, hold: Hold | None
+        self,
+        exchange: Exchange | None,
+        cause: Exception | None,
+        *,
+        is_closing: bool,
+        comes_back: bool,
+        hold: Hold | None,
     ) -> ConnectionLostError:
         """Say that the line is gone."""
+        sent = None
+        what = "the line is closed" if is_closing else "the line was lost" + (f" ({_reason(cause)})" if cause else "")
         hint = None if is_closing else "a drive that was moving may go on; look at it before you connect again"
+        if exchange is not None and (exchange.is_on_wire or exchange.times_ahead):
+            sent = exchange.text
+        elif exchange is not None:
+            what += f", and {exchange.text!r} was not sent"
+        if hint is not None and comes_back:
+            hint = (
+                "the line is tried again all the while; a drive that was moving may go on, and shows it when it is back"
+            )
         if hint is not None and not self._history.has_received:
             hint = f"it has said nothing yet: is somebody else connected to that port already? {hint}"
         if hold is not None:
             hint = f"{hold.why}: look at the machine, and switch the device off and on before you connect again"
-        error = ConnectionLostError(
-            "the line is closed" if is_closing else "the line was lost" + (f" ({cause})" if cause else ""),
-            device=self._name,
-            sent=exchange.text if exchange else None,
-            hint=hint,
-            exchanges=self._history.lines(),
-        )
+        error = ConnectionLostError(what, device=self._name, sent=sent, hint=hint, exchanges=self._history.lines())
         error.__cause__ = cause
         return error
 
     @property
     def _not_in_time(self) -> str:
         return f"no answer within {self._answer_timeout_s:g} s"
+
+
+def _reason(cause: Exception) -> str:
+    return cause.what if isinstance(cause, CompaxError) else str(cause)

@@ -2,33 +2,33 @@
 One line: exchanges wait in lanes, one is on the wire, and a time-out never shifts the answers that come after it.
 
 The link knows turns and time, and no device: what bytes mean is told to it by a
-:class:`~compax_aio.link.contract.DeviceProtocol`. It never awaits inside: everything happens in callbacks of the
-event loop, so a caller that is cancelled leaves nothing half done.
+:class:`~compax_aio.link.contract.DeviceProtocol`. It never awaits inside a turn: everything happens in callbacks of the
+event loop, so a caller that is cancelled leaves nothing half done. A line that is lost is opened again, if that is
+wanted; what asks something waits for it, what tells something fails and is never sent again.
 """
 
 from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from functools import partial
 from typing import cast
 
-from ..errors import CompaxError, ConnectionLostError
+from ..errors import AnswerTimeoutError, CompaxError, ConnectionLostError, TransportError
 from ..transports.registry import open_transport
 from .contract import DeviceProtocol, Event, Hold, HoldOver, InStep, Lane, LateEnding, MarkerSpent, TurnOver
 from .deadline import Deadline
 from .exchanges import Exchange, ExchangeQueue
 from .failures import Failures
+from .port import Port
+from .reconnecting import Reconnecting
 from .stats import LinkStats
 from .wire import WireHistory
 
 __all__ = ["Link", "LinkStats"]
 
-_log = logging.getLogger(__name__)
-
-_CLOSE_GRACE_S = 0.5
-_ABORT_GRACE_S = 1.0
+_log = logging.getLogger("compax_aio.link")
 
 
 class Link(asyncio.Protocol):
@@ -41,7 +41,10 @@ class Link(asyncio.Protocol):
         answer_timeout_s: How long an answer may take before the line is in doubt.
         resync_attempts: How many markers are tried before the device counts as silent.
         on_event: Called with every event that is not about turns, as soon as it is read.
-        on_lost: Called once when an open line goes away.
+        on_lost: Called when an open line goes away for good.
+        greet: Awaited on every line that was opened and is in step, before anything goes over it that is less urgent
+            than ``Lane.GREETING``: looks who is there, and raises CompaxError if it is not who it should be.
+        reconnecting: How a line that was lost is opened again; None: it is not.
     """
 
     def __init__(
@@ -53,6 +56,8 @@ class Link(asyncio.Protocol):
         resync_attempts: int,
         on_event: Callable[[Event], None],
         on_lost: Callable[[ConnectionLostError], None],
+        greet: Callable[[], Awaitable[None]] | None = None,
+        reconnecting: Reconnecting | None = None,
     ) -> None:
         self.stats = LinkStats()
         self.history = WireHistory()
@@ -65,10 +70,12 @@ class Link(asyncio.Protocol):
         self._failures = Failures(name, self.history, answer_timeout_s, resync_attempts)
         self._on_event = on_event
         self._on_lost = on_lost
+        self._greet = greet
+        self._reconnecting = reconnecting
         self._loop = asyncio.get_running_loop()
-        self._transport: asyncio.Transport | None = None
-        self._closed = self._loop.create_future()
-        self._is_closing = False
+        self._port = Port(name, self.stats, self.history)
+        self._url = ""
+        self._is_closing = self._is_lost = False
         self._queue = ExchangeQueue()
         self._reads_timer: asyncio.TimerHandle | None = None
         self._outstanding: Exchange | None = None
@@ -80,53 +87,95 @@ class Link(asyncio.Protocol):
         self._is_reading = False
         self._deadline = Deadline(answer_timeout_s, self._time_is_up)
         self._grace: asyncio.TimerHandle | None = None
+        self._silence: AnswerTimeoutError | None = None
+        self._is_renewing = False
+        self._attempts = 0
 
     # Opening and closing --------------------------------------------------------------------------------------------
 
     async def open(self, url: str) -> None:
         """
-        Open the line that *url* names and bring it in step.
+        Open the line that *url* names, bring it in step, and greet who is there.
 
         Raises:
             TransportError: The line cannot be opened.
             UnexpectedAnswerError: Another device is at its far end.
             AnswerTimeoutError: Nobody on it answers as this device would, or nothing may be sent (:attr:`held`).
         """
-        self._opening = self._loop.create_future()
+        self._url = url
         try:
-            await open_transport(url, lambda: self)
-            await self._opening
+            await self._connect()
         except BaseException:
             await self.close()
             raise
+        self.admit()
+
+    async def _connect(self) -> None:
+        self._queue.is_admitted = False
+        self._attempts += 1
+        self._opening = self._loop.create_future()
+        try:
+            await open_transport(self._url, lambda: self)
+            await self._opening
         finally:
             self._opening = None
+        if self._greet is not None:
+            await self._greet()
 
     async def close(self) -> None:
-        """Close the line; what still waits fails with ConnectionLostError. Takes at most a second."""
+        """Close the line; what still waits fails with ConnectionLostError. Takes at most a second or two."""
         self._is_closing = True
-        if self._transport is None:
-            return
-        self._transport.close()
-        abort = self._loop.call_later(_CLOSE_GRACE_S, self._abort)
-        try:
-            await asyncio.wait([self._closed], timeout=_CLOSE_GRACE_S + _ABORT_GRACE_S)
-        finally:
-            abort.cancel()
-            self._abort()
-        if not self._closed.done():
-            _log.error("%s: the transport did not report its end", self._name)
-            self.connection_lost(None)
+        if self._reconnecting is not None:
+            await self._reconnecting.end()
+        await self._close_port()
+        self._fail_waiting(self._lost)
 
-    def _abort(self) -> None:
-        # After connection_lost, asyncio's own transports of CPython 3.11 do not bear it.
-        if self._transport is not None:
-            self._transport.abort()
+    async def _close_port(self) -> None:
+        if not await self._port.close():
+            self.connection_lost(None)
 
     @property
     def is_open(self) -> bool:
-        """Whether there is a line."""
-        return self._transport is not None and not self._is_closing
+        """Whether there is a line, and who is on it was looked at."""
+        return self._port.is_there and self._queue.is_admitted and not self.is_over
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the line is closed, or lost and not opened again."""
+        return self._is_closing or self._is_lost
+
+    # What getting a lost line back needs ----------------------------------------------------------------------------
+
+    async def reopen(self) -> None:
+        """Open the line again, once; raises CompaxError, with nothing left open, if that fails."""
+        try:
+            await self._close_port()
+            self._is_renewing = False
+            await self._connect()
+        except BaseException as error:
+            if isinstance(error, CompaxError) and not isinstance(error, TransportError):
+                self._fail_waiting(partial(self._failures.refused, error), but=self._came_during_attempt)
+            await self._close_port()
+            self._fail_what_tells(error if isinstance(error, CompaxError) else None)
+            raise
+
+    def admit(self) -> None:
+        """Let everything that waits go over the line."""
+        if self._attempts > 1:
+            self.stats.reconnects += 1
+        self._queue.is_admitted = True
+        self._pump()
+
+    def lose_patience(self) -> None:
+        """Fail what waits for the lost line."""
+        self._fail_waiting(self._lost)
+
+    def give_up(self, error: CompaxError) -> None:
+        """Take note that the line is lost for good."""
+        self._is_lost = True
+        loss = self._lost(None, error)
+        self._fail_waiting(lambda exchange: self._lost(exchange, error))
+        self._on_lost(loss)
 
     @property
     def is_free(self) -> bool:
@@ -146,6 +195,7 @@ class Link(asyncio.Protocol):
         lane: Lane,
         *,
         settles_late: bool = False,
+        survives_loss: bool = False,
         on_sent: Callable[[], None] | None = None,
     ) -> asyncio.Future[TurnOver]:
         """
@@ -156,6 +206,8 @@ class Link(asyncio.Protocol):
             lane: What goes first. Identical lines that wait in ``Lane.READ`` share one exchange.
             settles_late: After a time-out, wait until the line is in step again, for the answer may come late; where
                 nothing may be sent to get in step, only as long as an answer may take, once more.
+            survives_loss: Wait for a line that is lost, and send it again when it is back; for what does no harm when
+                the device gets it twice.
             on_sent: Called when the line is handed to the transport.
 
         Returns:
@@ -163,13 +215,22 @@ class Link(asyncio.Protocol):
             cancelling it takes the line from the queue, or drops its answer when it is on the wire.
         """
         waiter: asyncio.Future[TurnOver] = self._loop.create_future()
-        if not self.is_open:
-            waiter.set_exception(self._lost(Exchange(text)))
+        survives_loss &= lane is not Lane.GREETING
+        exchange = Exchange(text, lane, settles_late, survives_loss, self._attempts, on_sent, [waiter])
+        if not self._takes(exchange):
+            waiter.set_exception(self._lost(exchange))
             return waiter
-        self._queue.put(Exchange(text, settles_late, on_sent, [waiter]), lane)
+        self._queue.put(exchange)
+        if self._silence is not None:
+            self._renew(self._silence)
         self._ensure_doubt_is_pursued()
         self._pump()
         return waiter
+
+    def _takes(self, exchange: Exchange) -> bool:
+        if self.is_over or self._port.is_there or self._is_renewing:
+            return not self.is_over
+        return exchange.survives_loss and self._reconnecting is not None and self._reconnecting.is_patient
 
     def hold_reads(self, for_s: float) -> None:
         """Let what waits in ``Lane.READ`` wait on, at most *for_s* from now; what is on the wire goes on."""
@@ -204,9 +265,10 @@ class Link(asyncio.Protocol):
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Take the transport, and begin to get in step."""
-        self._transport = cast("asyncio.Transport", transport)  # uvloop's transports are no subclasses
+        line = cast("asyncio.Transport", transport)  # uvloop's transports are no subclasses
+        self._port.opened(line)
         if self._is_closing:  # while it was being opened
-            self._transport.abort()
+            self._port.hang_up()
             return
         self._protocol.line_opened()
         self._begin_doubt()
@@ -214,10 +276,9 @@ class Link(asyncio.Protocol):
 
     def data_received(self, data: bytes) -> None:
         """Pass bytes in, events out."""
-        self.stats.bytes_received += len(data)
-        self.history.received(self._loop.time(), data)
-        if _log.isEnabledFor(logging.DEBUG):
-            _log.debug("%s ← %r", self._name, data)
+        if not self._port.is_there:  # any more
+            return
+        self._port.received(data)
         self._protocol.receive(data)
         self._flush()
         # Nothing new is sent until every event is dealt with: a turn that began in between would get their answers.
@@ -232,24 +293,43 @@ class Link(asyncio.Protocol):
         self._pump()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Fail everything that waits: nobody can say any more what becomes of it."""
-        self._transport = None
+        """Fail what tells something: nobody can say any more what becomes of it. What asks may wait for the line."""
+        self._port.ended()
         self._deadline.cancel()
-        if not self._closed.done():
-            self._closed.set_result(None)
         if self._protocol.is_busy:
             self._protocol.time_ran_out()
         self.release_reads()
-        self._stop_pursuing(lambda exchange: self._lost(exchange, exc))
-        if not self._is_closing:
-            self._on_lost(self._lost(None, exc))
+        if self._is_renewing:
+            return
+        was_admitted, self._queue.is_admitted = self._queue.is_admitted, False
+        self._fail_what_tells(exc)
+        if self._is_closing or not was_admitted:
+            return
+        error = self._lost(None, exc)
+        if self._reconnecting is not None:
+            _log.warning("%s", error)
+            self._reconnecting.begin(self, error, at_once=False)
+        else:
+            self._is_lost = True
+            self._on_lost(error)
+
+    def _fail_what_tells(self, cause: Exception | None) -> None:
+        self._fail_waiting(lambda exchange: self._lost(exchange, cause), but=self._waits_for_line)
+
+    def _waits_for_line(self, exchange: Exchange) -> bool:
+        return exchange.survives_loss and self._reconnecting is not None and not self.is_over
+
+    def _came_during_attempt(self, exchange: Exchange) -> bool:
+        """Whether it was asked on a line that is lost while that was being opened: the next attempt is its first."""
+        is_attempt = not self._queue.is_admitted
+        return is_attempt and self._waits_for_line(exchange) and exchange.attempt == self._attempts
 
     # Turns ----------------------------------------------------------------------------------------------------------
 
     def _pump(self) -> None:
         """Send what is next, if the line is free."""
         protocol = self._protocol
-        while self.is_open and not protocol.is_busy and not self._is_reading:
+        while self._port.is_there and not (self._is_closing or protocol.is_busy or self._is_reading):
             if protocol.in_doubt:
                 if not self._pursue_doubt():
                     if self._grace is None:
@@ -258,6 +338,7 @@ class Link(asyncio.Protocol):
             elif (exchange := self._queue.take_next()) is not None:
                 self._outstanding = exchange
                 protocol.send(exchange.text)
+                exchange.is_on_wire = True
                 self._flush()
                 self._deadline.put_off()
                 if exchange.on_sent is not None:
@@ -266,19 +347,15 @@ class Link(asyncio.Protocol):
                 return
 
     def _flush(self) -> None:
-        data = self._protocol.bytes_to_send()
-        if data and self._transport is not None:
+        if data := self._protocol.bytes_to_send():
             self.lines_sent += 1
-            self.stats.bytes_sent += len(data)
-            self.history.sent(self._loop.time(), data)
-            if _log.isEnabledFor(logging.DEBUG):
-                _log.debug("%s → %r", self._name, data)
-            self._transport.write(data)
+            self._port.write(data)
 
     def _handle(self, event: Event) -> None:
         if isinstance(event, TurnOver):
             exchange, self._outstanding = self._outstanding, None
             self.stats.exchanges += 1
+            self.stats.answer_times_s.append(self._loop.time() - self._deadline.counted_from)
             if self._protocol.in_doubt:
                 self._begin_doubt()
             if exchange is not None:
@@ -345,23 +422,49 @@ class Link(asyncio.Protocol):
 
     def _give_up(self) -> None:
         """Tell everyone who waits why there is no answer. What is asked next begins anew."""
+        but = self._came_during_attempt
         if (hold := self._protocol.held) is not None:
-            self._stop_pursuing(partial(self._failures.hold, hold))
+            self._fail_waiting(partial(self._failures.hold, hold), but=but)
         elif (stranger := self._protocol.stranger(time_is_over=True)) is not None:
-            self._stop_pursuing(partial(self._failures.stranger, stranger))
+            self._fail_waiting(partial(self._failures.stranger, stranger), but=but)
         else:
-            self._stop_pursuing(self._failures.silence)
+            self._note_silence()
+            self._fail_waiting(self._failures.silence, but=but)
 
-    def _stop_pursuing(self, make_error: Callable[[Exchange | None], CompaxError]) -> None:
-        """Fail everything that waits, the opening too."""
+    def _note_silence(self) -> None:
+        """Let a line on which nothing has come for long be opened anew when it is used next: it may lead nowhere."""
+        if self._reconnecting is not None and self._queue.is_admitted:
+            silent_s = self._loop.time() - self._port.heard_at
+            is_long = silent_s >= self._reconnecting.patience_s
+            self._silence = self._failures.silence(None) if is_long else None
+
+    def _renew(self, silence: AnswerTimeoutError) -> None:
+        assert self._reconnecting is not None
+        self._silence = None
+        self._is_renewing = True
+        self._queue.is_admitted = False
+        self._port.hang_up()
+        self._reconnecting.begin(self, self._lost(None, silence), at_once=True)
+
+    def _fail_waiting(
+        self,
+        make_error: Callable[[Exchange | None], CompaxError],
+        *,
+        but: Callable[[Exchange], bool] = lambda _: False,
+    ) -> None:
+        """Fail everything that waits, the opening too; those for which *but* holds are queued anew."""
         self._end_grace()
         self._markers_left = 0
         self._is_pursuing = False
-        waiting = self._queue.take_all()
-        waiting += [exchange for exchange in (self._outstanding, self._doubtful) if exchange is not None]
+        waiting = [exchange for exchange in (self._doubtful, self._outstanding) if exchange is not None]
+        waiting += self._queue.take_all()
         self._outstanding = self._doubtful = None
         for exchange in waiting:
-            exchange.fail(make_error)
+            if but(exchange):
+                exchange.begin_anew()
+                self._queue.put(exchange)
+            else:
+                exchange.fail(make_error)
         if self._opening is not None and not self._opening.done():
             self._opening.set_exception(make_error(None))
 
@@ -372,7 +475,10 @@ class Link(asyncio.Protocol):
             exchange.fail(partial(self._failures.hold, hold) if hold else self._failures.timeout)
 
     def _lost(self, exchange: Exchange | None, cause: Exception | None = None) -> ConnectionLostError:
-        return self._failures.loss(exchange, cause, is_closing=self._is_closing, hold=self._protocol.held)
+        comes_back = self._reconnecting is not None and not self.is_over
+        return self._failures.loss(
+            exchange, cause, is_closing=self._is_closing, comes_back=comes_back, hold=self._protocol.held
+        )
 
     # Time -----------------------------------------------------------------------------------------------------------
 

@@ -25,6 +25,10 @@ class SettingFact:
 SETTING_FACTS: Final = (
     SettingFact(name="answer_timeout_s", meaning="how long an answer may take; the drive's own time is not documented"),
     SettingFact(name="resync_attempts", meaning="status queries to get back in step before the drive counts as silent"),
+    SettingFact(name="reconnect", meaning="open a line that was lost, or that keeps silent, again"),
+    SettingFact(name="reconnect_first_s", meaning="when a lost line is tried first, at most; later ever more rarely"),
+    SettingFact(name="reconnect_slowest_s", meaning="longest pause between two attempts to get a lost line back"),
+    SettingFact(name="reconnect_attempts", meaning="how often a lost line is tried; without it, until it is back"),
     SettingFact(name="unit", meaning="name of the unit chosen with P90, for people", source="UG p. 100"),
     SettingFact(
         name="decimals",

@@ -71,7 +71,7 @@ class SimulatedDrive:
         self._extra_answer_delay_s = 0.0
         self._now = 0.0
         self.served_by: Host | None = None
-        self._machine = Machine(self.knobs, self.log)
+        self._machine = Machine(self.knobs, self.log, name)
         self._port = SerialPort(self.knobs)
         self._console = Console(self._machine)
         self._heed_p20()

@@ -55,8 +55,9 @@ class Message:
 class Machine:
     """Everything of one drive but its port; time only goes forward."""
 
-    def __init__(self, knobs: Knobs, log: Log) -> None:
+    def __init__(self, knobs: Knobs, log: Log, name: str) -> None:
         self.knobs = knobs
+        self.name = name
         self.log = log
         self.faults = FaultMemory()
         self.parameters = Parameters(knobs)

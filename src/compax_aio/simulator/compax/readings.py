@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from typing import Final
+from zlib import crc32
 
 from compax_aio.compax.facts.status import S16_BITS, S17_BITS, STATUS_VALUES, StatusBit
 
@@ -130,8 +131,12 @@ _STATUS: Final[Mapping[int, _Reader]] = {
     18: _s18,
     **dict.fromkeys(range(23, 27), _placeholder("0")),
     30: _s30,
-    **{number: _placeholder(f"SIMULATOR {number - 30}") for number in range(31, 40)},
+    **{number: _placeholder(f"SIMULATOR {number - 30}") for number in range(31, 39)},
+    39: lambda machine, _: f"SIMULATOR {crc32(machine.name.encode()) % 1_000_000}",
 }
-"""S23-S26, diagnosis, and S31-S39, identification, are four and nine values (IBS p. 12): placeholders."""
+"""
+S23-S26, diagnosis, and S31-S39, identification, are four and nine values (IBS p. 12): placeholders, of which the last
+tells two drives from each other.
+"""
 
 _PARAMETER_UNITS: Final = {1: "axis", 2: "%", 6: "ms", 10: "ms", 11: "axis", 12: "axis", 14: "axis"}

@@ -1,0 +1,93 @@
+"""Who is on a line that was opened: the drive that was there before, and whether it was switched off meanwhile."""
+
+from __future__ import annotations
+
+import logging
+from typing import Final
+
+from ..errors import AnswerTimeoutError, CommandRejectedError, UnexpectedAnswerError
+from ..link.contract import Lane
+from .codecs import decode_codes, value_text
+from .facts.device_errors import HISTORY_POWERED_ON
+from .line import DriveLine
+
+__all__ = ["Identity", "has_power_on_mark"]
+
+_log = logging.getLogger("compax_aio.compax")
+
+_IDENTIFICATION: Final = range(31, 40)
+"""Nine values, of which nobody at hand says what they are (IBS p. 12): together they are compared as they are sent."""
+
+
+class Identity:
+    """
+    What a drive says of itself, remembered from the first time to the next.
+
+    Args:
+        line: Of the drive.
+    """
+
+    def __init__(self, line: DriveLine) -> None:
+        self._line = line
+        self._values: dict[int, str] | None = None
+        self._history: tuple[int, ...] | None = None
+
+    async def check(self) -> bool:
+        """
+        Look who is there, ahead of all else; the first time, remember it.
+
+        Returns:
+            Whether the error history shows that the drive was switched off and on since the last time.
+
+        Raises:
+            UnexpectedAnswerError: It is another drive.
+            AnswerTimeoutError, ConnectionLostError: It does not say.
+        """
+        if self._values is None:
+            self._values = await self._learn()
+        else:
+            for number, known in self._values.items():
+                await self._compare(number, known)
+        before, self._history = self._history, await self._read_history()
+        return before is not None and self._history is not None and has_power_on_mark(before, self._history)
+
+    async def _learn(self) -> dict[int, str]:
+        values: dict[int, str] = {}
+        for number in _IDENTIFICATION:
+            try:
+                values[number] = await self._read(number)
+            except (AnswerTimeoutError, CommandRejectedError, UnexpectedAnswerError) as error:
+                _log.info("%s does not say who it is (S%d): %s", self._line.name, number, error)
+                break
+        return values
+
+    async def _compare(self, number: int, known: str) -> None:
+        try:
+            value = await self._read(number)
+        except CommandRejectedError as error:
+            value = error.received or "an error"
+        if value != known:
+            raise UnexpectedAnswerError(
+                f"another drive is on the line: its identification S{number} is {value!r}, and was {known!r}",
+                device=self._line.name,
+                sent=f"S{number}",
+                received=value,
+                hint="were cables or adapters swapped? Name an adapter by its serial number, which goes with it: "
+                "serial://?serial_number=…",
+                exchanges=self._line.link.recent(),
+            )
+
+    async def _read(self, number: int) -> str:
+        return value_text(await self._line.query(f"S{number}", Lane.GREETING))
+
+    async def _read_history(self) -> tuple[int, ...] | None:
+        try:
+            return await self._line.read("S18", decode_codes, Lane.GREETING)
+        except (AnswerTimeoutError, CommandRejectedError, UnexpectedAnswerError):
+            return self._history
+
+
+def has_power_on_mark(before: tuple[int, ...], now: tuple[int, ...]) -> bool:
+    """Whether a power-on mark is among what has come to an error history, newest first, since it was *before*."""
+    new = next((count for count in range(len(now)) if now[count:] == before[: len(now) - count]), len(now))
+    return HISTORY_POWERED_ON in now[:new]
