@@ -316,7 +316,7 @@ async def test_a_line_is_free_when_what_is_queued_is_written_at_once(line: Line)
 async def test_a_line_is_not_free_while_events_are_handled() -> None:
     line = Line(ScriptedFarEnd())
     seen: list[bool] = []
-    line.link._on_event = lambda _: seen.append(line.link.is_free)
+    line.link._turns._on_event = lambda _: seen.append(line.link.is_free)
     line.connect()
     await line.answer("S1")
     line.far.say(b"$" + PROMPT)

@@ -1,10 +1,8 @@
 """
-One line: exchanges wait in lanes, one is on the wire, and a time-out never shifts the answers that come after it.
+One line from its opening to its end: greeted before it is used, opened again when it is lost.
 
-The link knows turns and time, and no device: what bytes mean is told to it by a
-:class:`~compax_aio.link.contract.DeviceProtocol`. It never awaits inside a turn: everything happens in callbacks of the
-event loop, so a caller that is cancelled leaves nothing half done. A line that is lost is opened again, if that is
-wanted; what asks something waits for it, what tells something fails and is never sent again.
+The link knows no device: what bytes mean is told to it by a :class:`~compax_aio.link.contract.DeviceProtocol`. What
+waits on a line that is lost, if it asks something, waits on; if it tells something, it fails and is never sent again.
 """
 
 from __future__ import annotations
@@ -17,13 +15,13 @@ from typing import cast
 
 from ..errors import AnswerTimeoutError, CompaxError, ConnectionLostError, TransportError
 from ..transports.registry import open_transport
-from .contract import DeviceProtocol, Event, Hold, HoldOver, InStep, Lane, LateEnding, MarkerSpent, TurnOver
-from .deadline import Deadline
-from .exchanges import Exchange, ExchangeQueue
+from .contract import DeviceProtocol, Event, Hold, Lane, TurnOver
+from .exchanges import Exchange
 from .failures import Failures
 from .port import Port
 from .reconnecting import Reconnecting
 from .stats import LinkStats
+from .turns import Turns
 from .wire import WireHistory
 
 __all__ = ["Link", "LinkStats"]
@@ -61,32 +59,28 @@ class Link(asyncio.Protocol):
     ) -> None:
         self.stats = LinkStats()
         self.history = WireHistory()
-        self.lines_sent = 0
-        """Everything that was written on this line, markers included; compare it, to see whether the line was used."""
         self._protocol = protocol
-        self._name = name
-        self._answer_timeout_s = answer_timeout_s
-        self._resync_attempts = resync_attempts
         self._failures = Failures(name, self.history, answer_timeout_s, resync_attempts)
-        self._on_event = on_event
         self._on_lost = on_lost
         self._greet = greet
         self._reconnecting = reconnecting
         self._loop = asyncio.get_running_loop()
         self._port = Port(name, self.stats, self.history)
+        self._turns = Turns(
+            protocol,
+            name=name,
+            port=self._port,
+            stats=self.stats,
+            failures=self._failures,
+            history=self.history,
+            answer_timeout_s=answer_timeout_s,
+            resync_attempts=resync_attempts,
+            on_event=on_event,
+            on_silence=self._note_silence,
+            spares=self._came_during_attempt,
+        )
         self._url = ""
         self._is_closing = self._is_lost = False
-        self._queue = ExchangeQueue()
-        self._reads_timer: asyncio.TimerHandle | None = None
-        self._outstanding: Exchange | None = None
-        self._doubtful: Exchange | None = None
-        self._opening: asyncio.Future[None] | None = None
-        self._markers_left = 0
-        self._is_pursuing = False
-        self._may_send_ahead = False
-        self._is_reading = False
-        self._deadline = Deadline(answer_timeout_s, self._time_is_up)
-        self._grace: asyncio.TimerHandle | None = None
         self._silence: AnswerTimeoutError | None = None
         self._is_renewing = False
         self._attempts = 0
@@ -111,24 +105,27 @@ class Link(asyncio.Protocol):
         self.admit()
 
     async def _connect(self) -> None:
-        self._queue.is_admitted = False
+        self._turns.queue.is_admitted = False
         self._attempts += 1
-        self._opening = self._loop.create_future()
+        in_step = self._turns.until_in_step()
+        in_step.add_done_callback(lambda each: each.cancelled() or each.exception())  # if the opener fails, nobody asks
         try:
             await open_transport(self._url, lambda: self)
-            await self._opening
-        finally:
-            self._opening = None
+        except BaseException:
+            in_step.cancel()
+            raise
+        await in_step
         if self._greet is not None:
             await self._greet()
 
     async def close(self) -> None:
         """Close the line; what still waits fails with ConnectionLostError. Takes at most a second or two."""
         self._is_closing = True
+        self._turns.end()
         if self._reconnecting is not None:
             await self._reconnecting.end()
         await self._close_port()
-        self._fail_waiting(self._lost)
+        self._turns.fail_waiting(self._lost)
 
     async def _close_port(self) -> None:
         if not await self._port.close():
@@ -137,7 +134,7 @@ class Link(asyncio.Protocol):
     @property
     def is_open(self) -> bool:
         """Whether there is a line, and who is on it was looked at."""
-        return self._port.is_there and self._queue.is_admitted and not self.is_over
+        return self._port.is_there and self._turns.queue.is_admitted and not self.is_over
 
     @property
     def is_over(self) -> bool:
@@ -154,7 +151,7 @@ class Link(asyncio.Protocol):
             await self._connect()
         except BaseException as error:
             if isinstance(error, CompaxError) and not isinstance(error, TransportError):
-                self._fail_waiting(partial(self._failures.refused, error), but=self._came_during_attempt)
+                self._turns.fail_waiting(partial(self._failures.refused, error), but=self._came_during_attempt)
             await self._close_port()
             self._fail_what_tells(error if isinstance(error, CompaxError) else None)
             raise
@@ -163,24 +160,29 @@ class Link(asyncio.Protocol):
         """Let everything that waits go over the line."""
         if self._attempts > 1:
             self.stats.reconnects += 1
-        self._queue.is_admitted = True
-        self._pump()
+        self._turns.queue.is_admitted = True
+        self._turns.pump()
 
     def lose_patience(self) -> None:
         """Fail what waits for the lost line."""
-        self._fail_waiting(self._lost)
+        self._turns.fail_waiting(self._lost)
 
     def give_up(self, error: CompaxError) -> None:
         """Take note that the line is lost for good."""
         self._is_lost = True
         loss = self._lost(None, error)
-        self._fail_waiting(lambda exchange: self._lost(exchange, error))
+        self._turns.fail_waiting(lambda exchange: self._lost(exchange, error))
         self._on_lost(loss)
+
+    @property
+    def lines_sent(self) -> int:
+        """Everything that was written on this line, markers included; compare it, to see whether the line was used."""
+        return self._turns.lines_sent
 
     @property
     def is_free(self) -> bool:
         """Whether a line that is queued now would be written at once, unless it is a read that is held back."""
-        return self.is_open and not (self._protocol.is_busy or self._protocol.in_doubt or self._is_reading)
+        return self.is_open and self._turns.is_free
 
     @property
     def held(self) -> Hold | None:
@@ -220,11 +222,9 @@ class Link(asyncio.Protocol):
         if not self._takes(exchange):
             waiter.set_exception(self._lost(exchange))
             return waiter
-        self._queue.put(exchange)
         if self._silence is not None:
             self._renew(self._silence)
-        self._ensure_doubt_is_pursued()
-        self._pump()
+        self._turns.put(exchange)
         return waiter
 
     def _takes(self, exchange: Exchange) -> bool:
@@ -234,28 +234,15 @@ class Link(asyncio.Protocol):
 
     def hold_reads(self, for_s: float) -> None:
         """Let what waits in ``Lane.READ`` wait on, at most *for_s* from now; what is on the wire goes on."""
-        self._queue.reads_are_held = True
-        if self._reads_timer is not None:
-            self._reads_timer.cancel()
-        self._reads_timer = self._loop.call_later(for_s, self.release_reads)
+        self._turns.hold_reads(for_s)
 
     def release_reads(self) -> None:
         """Let reads go on; harmless when they are not held back."""
-        if self._reads_timer is not None:
-            self._reads_timer.cancel()
-            self._reads_timer = None
-            self._queue.reads_are_held = False
-            self._pump()
+        self._turns.release_reads()
 
     def resume(self) -> None:
         """Take a person's word that what the line is :attr:`held` for can do no harm, and get in step; else nothing."""
-        if self._protocol.held is None:
-            return
-        self._protocol.resume()
-        self._end_grace()
-        self._fail_doubtful()
-        self._begin_doubt()
-        self._pump()
+        self._turns.resume()
 
     def recent(self) -> tuple[str, ...]:
         """Return the last exchanges of this line, oldest first, readable."""
@@ -270,38 +257,22 @@ class Link(asyncio.Protocol):
         if self._is_closing:  # while it was being opened
             self._port.hang_up()
             return
-        self._protocol.line_opened()
-        self._begin_doubt()
-        self._pump()
+        self._turns.line_opened()
 
     def data_received(self, data: bytes) -> None:
         """Pass bytes in, events out."""
         if not self._port.is_there:  # any more
             return
         self._port.received(data)
-        self._protocol.receive(data)
-        self._flush()
-        # Nothing new is sent until every event is dealt with: a turn that began in between would get their answers.
-        self._is_reading = True
-        try:
-            for event in self._protocol.events():
-                self._handle(event)
-        finally:
-            self._is_reading = False
-        if self._is_pursuing and self._protocol.stranger(time_is_over=False) is not None:
-            self._give_up()
-        self._pump()
+        self._turns.receive(data)
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Fail what tells something: nobody can say any more what becomes of it. What asks may wait for the line."""
         self._port.ended()
-        self._deadline.cancel()
-        if self._protocol.is_busy:
-            self._protocol.time_ran_out()
-        self.release_reads()
+        self._turns.line_lost()
         if self._is_renewing:
             return
-        was_admitted, self._queue.is_admitted = self._queue.is_admitted, False
+        was_admitted, self._turns.queue.is_admitted = self._turns.queue.is_admitted, False
         self._fail_what_tells(exc)
         if self._is_closing or not was_admitted:
             return
@@ -314,126 +285,19 @@ class Link(asyncio.Protocol):
             self._on_lost(error)
 
     def _fail_what_tells(self, cause: Exception | None) -> None:
-        self._fail_waiting(lambda exchange: self._lost(exchange, cause), but=self._waits_for_line)
+        self._turns.fail_waiting(lambda exchange: self._lost(exchange, cause), but=self._waits_for_line)
 
     def _waits_for_line(self, exchange: Exchange) -> bool:
         return exchange.survives_loss and self._reconnecting is not None and not self.is_over
 
     def _came_during_attempt(self, exchange: Exchange) -> bool:
         """Whether it was asked on a line that is lost while that was being opened: the next attempt is its first."""
-        is_attempt = not self._queue.is_admitted
+        is_attempt = not self._turns.queue.is_admitted
         return is_attempt and self._waits_for_line(exchange) and exchange.attempt == self._attempts
-
-    # Turns ----------------------------------------------------------------------------------------------------------
-
-    def _pump(self) -> None:
-        """Send what is next, if the line is free."""
-        protocol = self._protocol
-        while self._port.is_there and not (self._is_closing or protocol.is_busy or self._is_reading):
-            if protocol.in_doubt:
-                if not self._pursue_doubt():
-                    if self._grace is None:
-                        self._give_up()
-                    return
-            elif (exchange := self._queue.take_next()) is not None:
-                self._outstanding = exchange
-                protocol.send(exchange.text)
-                exchange.is_on_wire = True
-                self._flush()
-                self._deadline.put_off()
-                if exchange.on_sent is not None:
-                    exchange.on_sent()
-            else:
-                return
-
-    def _flush(self) -> None:
-        if data := self._protocol.bytes_to_send():
-            self.lines_sent += 1
-            self._port.write(data)
-
-    def _handle(self, event: Event) -> None:
-        if isinstance(event, TurnOver):
-            exchange, self._outstanding = self._outstanding, None
-            self.stats.exchanges += 1
-            self.stats.answer_times_s.append(self._loop.time() - self._deadline.counted_from)
-            if self._protocol.in_doubt:
-                self._begin_doubt()
-            if exchange is not None:
-                exchange.end(event)
-        elif isinstance(event, LateEnding):
-            self.stats.late_answers += 1
-            _log.info("%s: the answer to %r came late", self._name, event.sent)
-            if self._doubtful is not None and self._doubtful.text == event.sent:
-                self._doubtful.end(event.outcome)
-        elif isinstance(event, InStep):
-            self._end_doubt()
-        elif isinstance(event, HoldOver):
-            self._begin_doubt()
-        elif not isinstance(event, MarkerSpent):
-            self._ensure_doubt_is_pursued()
-            self._on_event(event)
-
-    # Doubt ----------------------------------------------------------------------------------------------------------
-
-    def _begin_doubt(self) -> None:
-        self._markers_left = self._resync_attempts
-        self._is_pursuing = True
-        self._may_send_ahead = True
-
-    def _ensure_doubt_is_pursued(self) -> None:
-        if not self._is_pursuing and self._protocol.in_doubt and not self._protocol.is_busy and not self._markers_left:
-            self._begin_doubt()
-
-    def _pursue_doubt(self) -> bool:
-        """Send the next thing that helps to get in step; False when there is nothing left to try."""
-        if not self._markers_left:
-            return False
-        stop = self._queue.first_stop()
-        if self._protocol.held is not None:
-            if stop is None:
-                return False
-            self._markers_left -= 1
-            self._send_ahead(stop)
-        elif stop is not None and self._may_send_ahead:
-            # In turn with the markers, for half a line in the device's buffer may spoil either; the exchange itself
-            # follows when in step.
-            self._may_send_ahead = False
-            self._send_ahead(stop)
-        else:
-            self._markers_left -= 1
-            self._may_send_ahead = True
-            self._protocol.send_marker()
-        self._flush()
-        self._deadline.put_off()
-        return True
-
-    def _send_ahead(self, stop: Exchange) -> None:
-        stop.times_ahead += 1
-        self._protocol.send_ahead(stop.text)
-
-    def _end_doubt(self) -> None:
-        self.stats.resynchronisations += 1
-        self._markers_left = 0
-        self._is_pursuing = False
-        self._end_grace()
-        self._fail_doubtful()
-        if self._opening is not None and not self._opening.done():
-            self._opening.set_result(None)
-
-    def _give_up(self) -> None:
-        """Tell everyone who waits why there is no answer. What is asked next begins anew."""
-        but = self._came_during_attempt
-        if (hold := self._protocol.held) is not None:
-            self._fail_waiting(partial(self._failures.hold, hold), but=but)
-        elif (stranger := self._protocol.stranger(time_is_over=True)) is not None:
-            self._fail_waiting(partial(self._failures.stranger, stranger), but=but)
-        else:
-            self._note_silence()
-            self._fail_waiting(self._failures.silence, but=but)
 
     def _note_silence(self) -> None:
         """Let a line on which nothing has come for long be opened anew when it is used next: it may lead nowhere."""
-        if self._reconnecting is not None and self._queue.is_admitted:
+        if self._reconnecting is not None and self._turns.queue.is_admitted:
             silent_s = self._loop.time() - self._port.heard_at
             is_long = silent_s >= self._reconnecting.patience_s
             self._silence = self._failures.silence(None) if is_long else None
@@ -442,70 +306,12 @@ class Link(asyncio.Protocol):
         assert self._reconnecting is not None
         self._silence = None
         self._is_renewing = True
-        self._queue.is_admitted = False
+        self._turns.queue.is_admitted = False
         self._port.hang_up()
         self._reconnecting.begin(self, self._lost(None, silence), at_once=True)
-
-    def _fail_waiting(
-        self,
-        make_error: Callable[[Exchange | None], CompaxError],
-        *,
-        but: Callable[[Exchange], bool] = lambda _: False,
-    ) -> None:
-        """Fail everything that waits, the opening too; those for which *but* holds are queued anew."""
-        self._end_grace()
-        self._markers_left = 0
-        self._is_pursuing = False
-        waiting = [exchange for exchange in (self._doubtful, self._outstanding) if exchange is not None]
-        waiting += self._queue.take_all()
-        self._outstanding = self._doubtful = None
-        for exchange in waiting:
-            if but(exchange):
-                exchange.begin_anew()
-                self._queue.put(exchange)
-            else:
-                exchange.fail(make_error)
-        if self._opening is not None and not self._opening.done():
-            self._opening.set_exception(make_error(None))
-
-    def _fail_doubtful(self) -> None:
-        if self._doubtful is not None:
-            exchange, self._doubtful = self._doubtful, None
-            hold = self._protocol.held
-            exchange.fail(partial(self._failures.hold, hold) if hold else self._failures.timeout)
 
     def _lost(self, exchange: Exchange | None, cause: Exception | None = None) -> ConnectionLostError:
         comes_back = self._reconnecting is not None and not self.is_over
         return self._failures.loss(
             exchange, cause, is_closing=self._is_closing, comes_back=comes_back, hold=self._protocol.held
         )
-
-    # Time -----------------------------------------------------------------------------------------------------------
-
-    def _time_is_up(self) -> None:
-        if not self._protocol.is_busy:
-            return
-        self._protocol.time_ran_out()
-        if self._outstanding is not None:
-            self.stats.timeouts += 1
-            exchange, self._outstanding = self._outstanding, None
-            _log.warning("%s: no answer to %r within %g s", self._name, exchange.text, self._answer_timeout_s)
-            exchange.is_late = True
-            self._doubtful = exchange
-            exchange.received = self.history.received_since_sent()
-            if not exchange.settles_late:
-                self._fail_doubtful()
-            self._begin_doubt()
-            if self._protocol.held is not None:
-                self._grace = self._loop.call_later(self._answer_timeout_s, self._grace_is_over)
-        self._pump()
-
-    def _grace_is_over(self) -> None:
-        """Where nothing may be sent to get in step, a late answer is waited for no longer."""
-        self._end_grace()
-        self._pump()
-
-    def _end_grace(self) -> None:
-        if self._grace is not None:
-            self._grace.cancel()
-            self._grace = None

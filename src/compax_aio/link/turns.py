@@ -1,0 +1,325 @@
+"""
+Turns on one line: exchanges wait in lanes, one is on the wire, and a time-out never shifts the answers that follow.
+
+What bytes mean is told by a :class:`~compax_aio.link.contract.DeviceProtocol`. Nothing here awaits: everything happens
+in callbacks of the event loop, so a caller that is cancelled leaves nothing half done.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+from functools import partial
+
+from ..errors import CompaxError
+from .contract import DeviceProtocol, Event, HoldOver, InStep, LateEnding, MarkerSpent, TurnOver
+from .deadline import Deadline
+from .exchanges import Exchange, ExchangeQueue
+from .failures import Failures
+from .port import Port
+from .stats import LinkStats
+from .wire import WireHistory
+
+__all__ = ["Turns"]
+
+_log = logging.getLogger("compax_aio.link")
+
+
+class Turns:
+    """
+    Runs a device's protocol over a port: says what is sent next, and whose answer came.
+
+    Args:
+        protocol: The device's end of the line.
+        name: For logs.
+        port: Bytes go out there.
+        stats: What is counted.
+        failures: Make the errors of the line.
+        history: The last bytes of the line.
+        answer_timeout_s: How long an answer may take before the line is in doubt.
+        resync_attempts: How many markers are tried before the device counts as silent.
+        on_event: Called with every event that is not about turns, as soon as it is read.
+        on_silence: Called when nobody has answered any marker.
+        spares: Says what goes on waiting although there is no answer to what was sent until now.
+    """
+
+    def __init__(
+        self,
+        protocol: DeviceProtocol,
+        *,
+        name: str,
+        port: Port,
+        stats: LinkStats,
+        failures: Failures,
+        history: WireHistory,
+        answer_timeout_s: float,
+        resync_attempts: int,
+        on_event: Callable[[Event], None],
+        on_silence: Callable[[], None],
+        spares: Callable[[Exchange], bool],
+    ) -> None:
+        self.lines_sent = 0
+        self.queue = ExchangeQueue()
+        self._protocol = protocol
+        self._name = name
+        self._port = port
+        self._stats = stats
+        self._failures = failures
+        self._history = history
+        self._answer_timeout_s = answer_timeout_s
+        self._resync_attempts = resync_attempts
+        self._on_event = on_event
+        self._on_silence = on_silence
+        self._spares = spares
+        self._loop = asyncio.get_running_loop()
+        self._reads_timer: asyncio.TimerHandle | None = None
+        self._outstanding: Exchange | None = None
+        self._doubtful: Exchange | None = None
+        self._in_step: asyncio.Future[None] | None = None
+        self._markers_left = 0
+        self._is_pursuing = False
+        self._may_send_ahead = False
+        self._is_reading = False
+        self._is_ended = False
+        self._deadline = Deadline(answer_timeout_s, self._time_is_up)
+        self._grace: asyncio.TimerHandle | None = None
+
+    # What the link does ---------------------------------------------------------------------------------------------
+
+    @property
+    def is_free(self) -> bool:
+        """Whether a line that is queued now would be written at once, unless it is a read that is held back."""
+        return not (self._protocol.is_busy or self._protocol.in_doubt or self._is_reading)
+
+    def put(self, exchange: Exchange) -> None:
+        """Queue *exchange*, and write it if the line is free."""
+        self.queue.put(exchange)
+        self._ensure_doubt_is_pursued()
+        self.pump()
+
+    def until_in_step(self) -> asyncio.Future[None]:
+        """Return a future that is done when the line is in step, or fails with all else that waits."""
+        self._in_step = self._loop.create_future()
+        return self._in_step
+
+    def line_opened(self) -> None:
+        """Begin to get in step on a new line."""
+        self._protocol.line_opened()
+        self._begin_doubt()
+        self.pump()
+
+    def receive(self, data: bytes) -> None:
+        """Pass bytes in, events out."""
+        self._protocol.receive(data)
+        self._flush()
+        # Nothing new is sent until every event is dealt with: a turn that began in between would get their answers.
+        self._is_reading = True
+        try:
+            for event in self._protocol.events():
+                self._handle(event)
+        finally:
+            self._is_reading = False
+        if self._is_pursuing and self._protocol.stranger(time_is_over=False) is not None:
+            self._give_up()
+        self.pump()
+
+    def line_lost(self) -> None:
+        """Give up what is outstanding: nobody will answer it on this line."""
+        self._deadline.cancel()
+        if self._protocol.is_busy:
+            self._protocol.time_ran_out()
+        self.release_reads()
+
+    def end(self) -> None:
+        """Send nothing any more."""
+        self._is_ended = True
+
+    def hold_reads(self, for_s: float) -> None:
+        """Let what waits in ``Lane.READ`` wait on, at most *for_s* from now; what is on the wire goes on."""
+        self.queue.reads_are_held = True
+        if self._reads_timer is not None:
+            self._reads_timer.cancel()
+        self._reads_timer = self._loop.call_later(for_s, self.release_reads)
+
+    def release_reads(self) -> None:
+        """Let reads go on; harmless when they are not held back."""
+        if self._reads_timer is not None:
+            self._reads_timer.cancel()
+            self._reads_timer = None
+            self.queue.reads_are_held = False
+            self.pump()
+
+    def resume(self) -> None:
+        """Take a person's word that what the line is :attr:`held` for can do no harm, and get in step; else nothing."""
+        if self._protocol.held is None:
+            return
+        self._protocol.resume()
+        self._end_grace()
+        self._fail_doubtful()
+        self._begin_doubt()
+        self.pump()
+
+    # Turns ----------------------------------------------------------------------------------------------------------
+
+    def pump(self) -> None:
+        """Send what is next, if the line is free."""
+        protocol = self._protocol
+        while self._port.is_there and not (self._is_ended or protocol.is_busy or self._is_reading):
+            if protocol.in_doubt:
+                if not self._pursue_doubt():
+                    if self._grace is None:
+                        self._give_up()
+                    return
+            elif (exchange := self.queue.take_next()) is not None:
+                self._outstanding = exchange
+                protocol.send(exchange.text)
+                exchange.is_on_wire = True
+                self._flush()
+                self._deadline.put_off()
+                if exchange.on_sent is not None:
+                    exchange.on_sent()
+            else:
+                return
+
+    def _flush(self) -> None:
+        if data := self._protocol.bytes_to_send():
+            self.lines_sent += 1
+            self._port.write(data)
+
+    def _handle(self, event: Event) -> None:
+        if isinstance(event, TurnOver):
+            exchange, self._outstanding = self._outstanding, None
+            self._stats.exchanges += 1
+            self._stats.answer_times_s.append(self._loop.time() - self._deadline.counted_from)
+            if self._protocol.in_doubt:
+                self._begin_doubt()
+            if exchange is not None:
+                exchange.end(event)
+        elif isinstance(event, LateEnding):
+            self._stats.late_answers += 1
+            _log.info("%s: the answer to %r came late", self._name, event.sent)
+            if self._doubtful is not None and self._doubtful.text == event.sent:
+                self._doubtful.end(event.outcome)
+        elif isinstance(event, InStep):
+            self._end_doubt()
+        elif isinstance(event, HoldOver):
+            self._begin_doubt()
+        elif not isinstance(event, MarkerSpent):
+            self._ensure_doubt_is_pursued()
+            self._on_event(event)
+
+    # Doubt ----------------------------------------------------------------------------------------------------------
+
+    def _begin_doubt(self) -> None:
+        self._markers_left = self._resync_attempts
+        self._is_pursuing = True
+        self._may_send_ahead = True
+
+    def _ensure_doubt_is_pursued(self) -> None:
+        if not self._is_pursuing and self._protocol.in_doubt and not self._protocol.is_busy and not self._markers_left:
+            self._begin_doubt()
+
+    def _pursue_doubt(self) -> bool:
+        """Send the next thing that helps to get in step; False when there is nothing left to try."""
+        if not self._markers_left:
+            return False
+        stop = self.queue.first_stop()
+        if self._protocol.held is not None:
+            if stop is None:
+                return False
+            self._markers_left -= 1
+            self._send_ahead(stop)
+        elif stop is not None and self._may_send_ahead:
+            # In turn with the markers, for half a line in the device's buffer may spoil either; the exchange itself
+            # follows when in step.
+            self._may_send_ahead = False
+            self._send_ahead(stop)
+        else:
+            self._markers_left -= 1
+            self._may_send_ahead = True
+            self._protocol.send_marker()
+        self._flush()
+        self._deadline.put_off()
+        return True
+
+    def _send_ahead(self, stop: Exchange) -> None:
+        stop.times_ahead += 1
+        self._protocol.send_ahead(stop.text)
+
+    def _end_doubt(self) -> None:
+        self._stats.resynchronisations += 1
+        self._markers_left = 0
+        self._is_pursuing = False
+        self._end_grace()
+        self._fail_doubtful()
+        if self._in_step is not None and not self._in_step.done():
+            self._in_step.set_result(None)
+
+    def _give_up(self) -> None:
+        """Tell everyone who waits why there is no answer. What is asked next begins anew."""
+        if (hold := self._protocol.held) is not None:
+            self.fail_waiting(partial(self._failures.hold, hold), but=self._spares)
+        elif (stranger := self._protocol.stranger(time_is_over=True)) is not None:
+            self.fail_waiting(partial(self._failures.stranger, stranger), but=self._spares)
+        else:
+            self._on_silence()
+            self.fail_waiting(self._failures.silence, but=self._spares)
+
+    def fail_waiting(
+        self,
+        make_error: Callable[[Exchange | None], CompaxError],
+        *,
+        but: Callable[[Exchange], bool] = lambda _: False,
+    ) -> None:
+        """Fail everything that waits, the opening too; those for which *but* holds are queued anew."""
+        self._end_grace()
+        self._markers_left = 0
+        self._is_pursuing = False
+        waiting = [exchange for exchange in (self._doubtful, self._outstanding) if exchange is not None]
+        waiting += self.queue.take_all()
+        self._outstanding = self._doubtful = None
+        for exchange in waiting:
+            if but(exchange):
+                exchange.begin_anew()
+                self.queue.put(exchange)
+            else:
+                exchange.fail(make_error)
+        if self._in_step is not None and not self._in_step.done():
+            self._in_step.set_exception(make_error(None))
+
+    def _fail_doubtful(self) -> None:
+        if self._doubtful is not None:
+            exchange, self._doubtful = self._doubtful, None
+            hold = self._protocol.held
+            exchange.fail(partial(self._failures.hold, hold) if hold else self._failures.timeout)
+
+    # Time -----------------------------------------------------------------------------------------------------------
+
+    def _time_is_up(self) -> None:
+        if not self._protocol.is_busy:
+            return
+        self._protocol.time_ran_out()
+        if self._outstanding is not None:
+            self._stats.timeouts += 1
+            exchange, self._outstanding = self._outstanding, None
+            _log.warning("%s: no answer to %r within %g s", self._name, exchange.text, self._answer_timeout_s)
+            exchange.is_late = True
+            self._doubtful = exchange
+            exchange.received = self._history.received_since_sent()
+            if not exchange.settles_late:
+                self._fail_doubtful()
+            self._begin_doubt()
+            if self._protocol.held is not None:
+                self._grace = self._loop.call_later(self._answer_timeout_s, self._grace_is_over)
+        self.pump()
+
+    def _grace_is_over(self) -> None:
+        """Where nothing may be sent to get in step, a late answer is waited for no longer."""
+        self._end_grace()
+        self.pump()
+
+    def _end_grace(self) -> None:
+        if self._grace is not None:
+            self._grace.cancel()
+            self._grace = None
