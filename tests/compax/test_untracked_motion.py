@@ -9,7 +9,9 @@ import pytest
 from tests.promises.bench import bench, ending, is_moving, lines, motions, received, scripted
 
 from compax_aio import (
+    AnswerTimeoutError,
     CommandRejectedError,
+    CompaxError,
     Dialect,
     Drive,
     DriveSettings,
@@ -285,3 +287,29 @@ async def test_a_move_whose_error_nobody_has_learnt_is_complained_about(caplog: 
         del move
         gc.collect()
     assert "never retrieved" in caplog.text
+
+
+async def test_after_a_motion_of_which_nobody_knows_what_became_no_other_is_taken_until_reconciled() -> None:
+    async with bench() as (drive, far):
+        far.lose_answers = 1
+        error = await ending(drive.command("PA100"))
+        assert isinstance(error, AnswerTimeoutError)
+        assert "reconcile()" in str(error)
+        with pytest.raises(MoveInDoubtError, match="'PA100' is unknown"):
+            drive.move_to(5)
+        assert isinstance(await ending(drive.command("PA7")), MoveInDoubtError)
+        await drive.reconcile()
+        await drive.stop()
+        await drive.move_to(5)
+        assert motions(far) == ["POSA 100.00", "POSA 5.00"]
+
+
+async def test_a_motion_that_was_never_written_leaves_no_doubt() -> None:
+    async with bench(settings=DriveSettings(answer_timeout_s=0.2)) as (drive, far):
+        far.deaf = True
+        reading, telling = asyncio.ensure_future(drive.position()), asyncio.ensure_future(drive.command("PA100"))
+        assert isinstance(await ending(reading), CompaxError)
+        assert isinstance(await ending(telling), CompaxError)
+        far.deaf = False
+        await drive.move_to(5)
+        assert motions(far) == ["POSA 5.00"]

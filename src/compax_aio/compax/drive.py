@@ -262,12 +262,14 @@ class Drive(Readings, AxisCommands):
             InvalidCommandError: *text* is not one plain line of at most 30 characters; nothing was sent.
             MoveActiveError, MoveInDoubtError: It starts a motion, and a move is running or in doubt; nothing was sent.
             MoveStoppedError: It starts a motion, and a stop came before it was sent.
+            AnswerTimeoutError, ConnectionLostError: No answer came. If it starts a motion and was sent, the drive takes
+                no other until :meth:`reconcile`.
         """
         line = check_line(text).upper()
         if is_query(line):
             return await self._line.query(line)
         if starts_motion(line, self.settings.dialect.motions):
-            await self._motion.tell(line)
+            await self._motion.command(line)
         else:
             await self._line.command(line)
         return ""

@@ -6,6 +6,7 @@ import asyncio
 import logging
 
 from ..errors import (
+    AnswerTimeoutError,
     CommandRejectedError,
     CompaxError,
     ConnectionLostError,
@@ -175,6 +176,17 @@ class Motion:
             # Also where somebody else was quicker to stop it: the loop must not end before that is over.
             if self._stopping is not None:
                 await asyncio.wait([self._stopping])
+            raise
+
+    async def command(self, text: str) -> None:
+        """Send *text* as :meth:`tell` does; where nobody can say what became of it, no motion is taken any more."""
+        mark = self.untracked.mark()
+        try:
+            await self.tell(text)
+        except (AnswerTimeoutError, ConnectionLostError, UnexpectedAnswerError) as error:
+            if self.untracked.mark() != mark:
+                self._memory.doubt = f"what became of {text!r} is unknown ({error.what})"
+                error.hint = "look at the machine, then call reconcile(); this drive takes no motion until then"
             raise
 
     async def tell(self, text: str, *, unless_stopped_since: int | None = None) -> None:
