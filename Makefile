@@ -1,6 +1,6 @@
 # One virtual environment a purpose, each made from nothing but Python 3.11+ and make.
 .DEFAULT_GOAL := help
-.PHONY: help demo test check matrix docs clean
+.PHONY: help demo test check matrix docs torture fuzz hunt clean
 
 # The first Python 3.11 or newer that really starts; PYTHON=... forces one.
 PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11 python; do \
@@ -31,8 +31,19 @@ docs: $(VENV)/check.ready  ## the documents, in docs/_build/html
 matrix:  ## all tests on every CPython from 3.11 up that this machine has
 	@$(PYTHON) .ci/matrix.py
 
+torture:  ## who gets whose answer after a time-out, here and with other libraries
+	@$(MAKE) --no-print-directory VENV=.venv-bench .venv-bench/bench.ready
+	@.venv-bench/bin/python -m benchmarks.torture
+
+fuzz:  ## every parser with bytes that nobody thought of, FUZZ_S seconds each (60)
+	@$(MAKE) --no-print-directory VENV=.venv-fuzz .venv-fuzz/fuzz.ready
+	@.venv-fuzz/bin/python -m fuzz all -max_total_time=$(or $(FUZZ_S),60)
+
+hunt: $(VENV)/test.ready  ## whole applications in trouble, seed after seed, for HUNT_MINUTES (30)
+	@$(BIN)/python -m compax_aio.simulator.hunt --minutes $(or $(HUNT_MINUTES),30)
+
 clean:  ## forget the virtual environments and everything built
-	rm -rf .venv .venv-* build dist docs/_build .coverage .coverage.* .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-* build dist docs/_build .coverage .coverage.* .pytest_cache .mypy_cache .ruff_cache .hypothesis .fuzz
 
 $(VENV)/pip.ready:
 	@test -n "$(PYTHON)" || { echo "compax_aio needs Python 3.11 or newer; set PYTHON=/path/to/python3.11"; exit 1; }
@@ -51,4 +62,12 @@ $(VENV)/test.ready: $(VENV)/demo.ready pyproject.toml
 
 $(VENV)/check.ready: $(VENV)/test.ready pyproject.toml
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --group check
+	@touch $@
+
+$(VENV)/fuzz.ready: $(VENV)/pip.ready pyproject.toml
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e . --group fuzz
+	@touch $@
+
+$(VENV)/bench.ready: $(VENV)/pip.ready pyproject.toml
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e . --group benchmarks
 	@touch $@

@@ -25,6 +25,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from .escaping import escaped
+
 __all__ = [
     "AnswerTimeoutError",
     "CommandRejectedError",
@@ -80,13 +82,14 @@ class CompaxError(Exception):
 
     def __str__(self) -> str:
         """Say where, what, what was sent and received, and what to do."""
-        text = f"{self.device}: {self.what}" if self.device else self.what
+        what = escaped(self.what, keep="\n")  # a listing has an error a line
+        text = f"{escaped(self.device)}: {what}" if self.device else what
         if self.sent is not None:
             text += f"; sent {self.sent!r}"
         if self.received is not None:
             text += f"; received {self.received!r}"
         if self.hint:
-            text += f"; {self.hint}"
+            text += f"; {escaped(self.hint)}"
         return text
 
 

@@ -18,13 +18,14 @@ from typing import ClassVar
 
 import pytest
 from tests.conformance.far_ends import DescriptorFarEnd, FarEnd
-from tests.conformance.transport import TransportConformance
+from tests.conformance.transport import TransportConformance, Witness
 
-from compax_aio.transports import ProtocolFactory
+from compax_aio.errors import TransportError
+from compax_aio.transports import ProtocolFactory, open_transport
 
 pytestmark = pytest.mark.real_time
 
-OUTPUT_SPEED = 5  # its place in what termios.tcgetattr returns
+INPUT_FLAGS, CONTROL_FLAGS, OUTPUT_SPEED = 0, 2, 5  # their places in what termios.tcgetattr returns
 SER2NET = shutil.which("ser2net", path=f"{os.environ.get('PATH', '')}:/usr/sbin:/usr/local/sbin")
 
 
@@ -122,13 +123,77 @@ class TestTcpThroughSer2net(TransportConformance):
                 os.close(slave)
 
 
+@asynccontextmanager
+async def rfc2217_through_ser2net() -> AsyncIterator[tuple[int, int, FarEndOfRelay]]:
+    """Give port number, descriptor of the serial port's own side, and far end."""
+    master, slave = os.openpty()
+    port = free_port()
+    with served_by_ser2net(os.ttyname(slave), port, "telnet(rfc2217),") as ser2net:
+        far = FarEndOfRelay(master, ser2net)
+        await becomes_true(lambda: is_listened_on(port))
+        try:
+            yield port, slave, far
+        finally:
+            far.close()
+            os.close(slave)
+
+
+@pytest.mark.skipif(SER2NET is None, reason="ser2net is not installed")
+class TestRfc2217ThroughSer2net(TransportConformance):
+    bulk_bytes = 64 * 1024
+
+    # As above: ser2net flushes the port when its client has closed.
+    test_what_was_written_before_close_arrives = None  # type: ignore[assignment]
+    test_what_is_written_after_close_is_ignored = None  # type: ignore[assignment]
+
+    @asynccontextmanager
+    async def line(self) -> AsyncIterator[tuple[str, FarEnd]]:
+        async with rfc2217_through_ser2net() as (port, _, far):
+            yield f"rfc2217://127.0.0.1:{port}", far
+
+
+@pytest.mark.skipif(SER2NET is None, reason="ser2net is not installed")
+@pytest.mark.parametrize(
+    ("options", "speed", "control_flags", "input_flags"),
+    [
+        ("", termios.B9600, 0, 0),
+        ("?baudrate=4800&stopbits=2&xonxoff=1", termios.B4800, termios.CSTOPB, termios.IXON | termios.IXOFF),
+        ("?baudrate=19200&rtscts=1", termios.B19200, termios.CRTSCTS, 0),
+    ],
+)
+async def test_the_settings_of_a_url_arrive_at_the_port_that_ser2net_serves(
+    options: str, speed: int, control_flags: int, input_flags: int
+) -> None:
+    """All but the size of a character and its parity, which the kernel does not keep for a pty."""
+    async with rfc2217_through_ser2net() as (port, slave, _):
+        witness = Witness()
+        transport = await open_transport(f"rfc2217://127.0.0.1:{port}{options}", lambda: witness)
+        attributes = termios.tcgetattr(slave)
+        transport.abort()
+        await witness.is_lost()
+    assert attributes[OUTPUT_SPEED] == speed
+    assert attributes[CONTROL_FLAGS] & (termios.CSTOPB | termios.CRTSCTS) == control_flags
+    assert attributes[INPUT_FLAGS] & (termios.IXON | termios.IXOFF) == input_flags
+
+
+@pytest.mark.skipif(SER2NET is None, reason="ser2net is not installed")
+async def test_a_port_that_ser2net_serves_to_somebody_else_says_so() -> None:
+    async with rfc2217_through_ser2net() as (port, _, _):
+        witness = Witness()
+        transport = await open_transport(f"rfc2217://127.0.0.1:{port}", lambda: witness)
+        with pytest.raises(TransportError, match="saying 'Port already in use'"):
+            await open_transport(f"rfc2217://127.0.0.1:{port}", Witness)
+        transport.abort()
+        await witness.is_lost()
+
+
 @contextmanager
-def served_by_ser2net(serial_port: str, port: int) -> Iterator[subprocess.Popen[str]]:
+def served_by_ser2net(serial_port: str, port: int, layer: str = "") -> Iterator[subprocess.Popen[str]]:
     with tempfile.TemporaryDirectory() as directory:
         configuration = Path(directory, "ser2net.yaml")
         configuration.write_text(
             "connection: &drive\n"
-            f"  accepter: tcp,127.0.0.1,{port}\n"
+            f"  accepter: {layer}tcp,127.0.0.1,{port}\n"
             f"  connector: serialdev,{serial_port},9600n81,local\n"
         )
         with running(str(SER2NET), "-n", "-u", "-c", str(configuration), "-P", f"{directory}/pid") as process:

@@ -6,6 +6,7 @@ import asyncio
 import errno
 import os
 import stat
+import sys
 import termios
 import threading
 from collections.abc import AsyncIterator, Callable
@@ -17,26 +18,31 @@ from typing import Any
 import pytest
 import serial
 import serial_asyncio
+import serialx
 from tests.conformance.far_ends import DescriptorFarEnd, FarEnd
 from tests.conformance.transport import TransportConformance, Witness, descriptors
 
 from compax_aio.errors import ConnectionLostError, TransportError
-from compax_aio.transports import TransportURL, open_transport
-from compax_aio.transports.serial import PortInfo, connect_on_base, list_ports
+from compax_aio.transports import ProtocolFactory, TransportURL, open_transport, serial_line
+from compax_aio.transports import serial as serial_opener
+from compax_aio.transports.line_settings import LineSettings
+from compax_aio.transports.serial import PortInfo, list_ports
+from compax_aio.transports.serial_backends import connect_on_pyserial, connect_on_serialx
 from compax_aio.transports.serial_line import SerialLine
 
 # Between the two ends of a pty works a thread of the kernel, which the virtual clock cannot see.
 pytestmark = pytest.mark.real_time
 
 XON, XOFF = b"\x11", b"\x13"
+BACKENDS = ["pyserial", "serialx"]
 
 
 @asynccontextmanager
-async def pty(options: str = "") -> AsyncIterator[tuple[str, DescriptorFarEnd]]:
+async def pty(options: str = "", *, backend: str = "pyserial") -> AsyncIterator[tuple[str, DescriptorFarEnd]]:
     master, slave = os.openpty()
     far = DescriptorFarEnd(master)
     try:
-        yield f"serial://{os.ttyname(slave)}{options}", far
+        yield f"serial://{os.ttyname(slave)}?backend={backend}{options}", far
     finally:
         far.close()
         os.close(slave)
@@ -44,22 +50,28 @@ async def pty(options: str = "") -> AsyncIterator[tuple[str, DescriptorFarEnd]]:
 
 class TestSerialOnPty(TransportConformance):
     bulk_bytes = 64 * 1024
+    backend = "pyserial"
 
     @asynccontextmanager
     async def line(self) -> AsyncIterator[tuple[str, FarEnd]]:
-        async with pty() as line:
+        async with pty(backend=self.backend) as line:
             yield line
+
+
+class TestSerialOnPtyBySerialx(TestSerialOnPty):
+    backend = "serialx"
 
 
 class TestSerialHeldByXoff(TransportConformance):
     """Of the whole suite those tests that do not send Xon and Xoff as data, on a line that takes them as handshake."""
 
     bulk_bytes = 64 * 1024
+    backend = "pyserial"
     test_all_256_values_go_both_ways_unchanged = None  # type: ignore[assignment]
 
     @asynccontextmanager
     async def line(self) -> AsyncIterator[tuple[str, FarEnd]]:
-        async with pty("?xonxoff=1") as line:
+        async with pty("&xonxoff=1", backend=self.backend) as line:
             yield line
 
     async def test_a_line_held_by_xoff_is_lost_within_a_second_of_abort_while_another_answers(self) -> None:
@@ -93,10 +105,25 @@ class TestSerialHeldByXoff(TransportConformance):
             assert await far.read(4) == b"held"
             await witness.is_lost()
 
+    async def test_nothing_but_xon_ends_xoff(self) -> None:
+        async with self.opened() as (transport, _, far):
+            await far.write(XOFF)
+            await asyncio.sleep(0.02)
+            transport.write(b"held")
+            await far.write(b"any other byte")
+            await asyncio.sleep(0.02)
+            assert transport.get_write_buffer_size() == 4
+
+
+class TestSerialHeldByXoffBySerialx(TestSerialHeldByXoff):
+    backend = "serialx"
+
 
 @asynccontextmanager
-async def opened(options: str = "") -> AsyncIterator[tuple[SerialLine, Witness, DescriptorFarEnd]]:
-    async with asyncio.timeout(10), pty(options) as (url, far):
+async def opened(
+    options: str = "", *, backend: str = "pyserial"
+) -> AsyncIterator[tuple[SerialLine, Witness, DescriptorFarEnd]]:
+    async with asyncio.timeout(10), pty(options, backend=backend) as (url, far):
         witness = Witness()
         transport = await open_transport(url, lambda: witness)
         assert isinstance(transport, SerialLine)
@@ -110,7 +137,10 @@ async def opened(options: str = "") -> AsyncIterator[tuple[SerialLine, Witness, 
 # --- what is wrong with pyserial-asyncio's own transport
 
 
-async def test_nothing_that_may_block_is_called_on_the_event_loop(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("backend", BACKENDS)
+async def test_nothing_that_may_block_is_called_on_the_event_loop(
+    monkeypatch: pytest.MonkeyPatch, backend: str
+) -> None:
     on_the_loop: list[str] = []
 
     def watch(owner: Any, name: str) -> None:
@@ -128,10 +158,11 @@ async def test_nothing_that_may_block_is_called_on_the_event_loop(monkeypatch: p
     for owner, names in (
         (termios, ("tcdrain", "tcflush", "tcsetattr", "tcgetattr")),
         (serial.Serial, ("open", "close", "flush", "read", "write", "_reconfigure_port")),
+        (serialx.Serial, ("open", "close", "flush", "read", "write", "_reconfigure_port")),
     ):
         for name in names:
             watch(owner, name)
-    async with opened() as (transport, witness, far):
+    async with opened(backend=backend) as (transport, witness, far):
         transport.write(b"anything")
         await far.write(b"anything")
         assert await witness.receives(8)
@@ -163,7 +194,7 @@ async def test_a_driver_that_does_not_release_the_port_delays_nobody(monkeypatch
 
 async def test_what_the_driver_has_not_sent_yet_is_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
     unsent = [30]
-    monkeypatch.setattr(serial.Serial, "out_waiting", property(lambda _: unsent[0]))
+    monkeypatch.setattr(serial_line, "unsent_bytes", lambda _: unsent[0])
     async with opened() as (transport, witness, _):
         transport.close()
         await asyncio.sleep(0.05)
@@ -175,7 +206,7 @@ async def test_what_the_driver_has_not_sent_yet_is_waited_for(monkeypatch: pytes
 
 async def test_what_the_driver_never_sends_is_discarded_after_half_a_second(monkeypatch: pytest.MonkeyPatch) -> None:
     discarded: list[int] = []
-    monkeypatch.setattr(serial.Serial, "out_waiting", property(lambda _: 30))
+    monkeypatch.setattr(serial_line, "unsent_bytes", lambda _: 30)
     monkeypatch.setattr(termios, "tcflush", lambda _, queue: discarded.append(queue))
     async with opened() as (transport, witness, _):
         discarded.clear()
@@ -193,8 +224,9 @@ async def test_a_line_that_closes_as_the_event_loop_ends_is_released_without_it(
         assert not transport.serial.is_open
 
 
-async def test_unplugging_is_told_as_a_lost_connection() -> None:
-    async with opened() as (_, witness, far):
+@pytest.mark.parametrize("backend", BACKENDS)
+async def test_unplugging_is_told_as_a_lost_connection(backend: str) -> None:
+    async with opened(backend=backend) as (_, witness, far):
         await far.hang_up()
         await witness.is_lost()
     assert isinstance(witness.losses[0], ConnectionLostError)
@@ -217,7 +249,7 @@ async def test_a_port_that_fails_is_lost_with_the_cause(monkeypatch: pytest.Monk
 
 
 async def test_a_port_that_fails_while_bytes_are_unsent_is_lost_at_once() -> None:
-    async with opened("?xonxoff=1") as (transport, witness, far):
+    async with opened("&xonxoff=1") as (transport, witness, far):
         await far.write(XOFF)
         await asyncio.sleep(0.02)
         transport.write(b"held")
@@ -228,7 +260,7 @@ async def test_a_port_that_fails_while_bytes_are_unsent_is_lost_at_once() -> Non
 
 
 async def test_a_port_that_goes_away_while_it_is_closed_is_lost_at_once() -> None:
-    async with opened("?xonxoff=1") as (transport, witness, far):
+    async with opened("&xonxoff=1") as (transport, witness, far):
         await far.write(XOFF)
         await asyncio.sleep(0.02)
         transport.write(b"held")
@@ -274,6 +306,11 @@ async def test_bytes_are_written_before_write_returns() -> None:
         assert transport.get_write_buffer_size() == 0
 
 
+async def open_elsewhere(url: str, protocol_factory: ProtocolFactory) -> asyncio.Transport:
+    """Open *url* as where there is no POSIX."""
+    return await serial_opener._open_elsewhere(serial_opener._Request.of(TransportURL.parse(url)), protocol_factory)
+
+
 async def test_a_protocol_that_fails_to_connect_leaves_the_port_free() -> None:
     class Failing(Witness):
         def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -309,7 +346,7 @@ async def test_where_there_is_no_posix_the_base_is_connected_when_the_opener_ret
     async with pty() as (url, far):
         witness = Witness()
         port = serial.Serial(TransportURL.parse(url).path, timeout=0)
-        transport = await connect_on_base(port, lambda: witness)
+        transport = await connect_on_pyserial(port, lambda: witness)
         assert type(transport) is serial_asyncio.SerialTransport
         assert witness.transport is transport
         await far.write(b"hello")
@@ -318,11 +355,40 @@ async def test_where_there_is_no_posix_the_base_is_connected_when_the_opener_ret
         await witness.is_lost()
 
 
+async def test_where_there_is_no_posix_serialx_is_connected_when_the_opener_returns() -> None:
+    async with pty() as (url, far):
+        witness = Witness()
+        path = TransportURL.parse(url).path
+        transport = await connect_on_serialx(path, LineSettings(baudrate=4800), lambda: witness, dsrdtr=False)
+        assert witness.transport is transport
+        assert transport.get_extra_info("serial").baudrate == 4800
+        await far.write(b"hello")
+        assert await witness.receives(5) == b"hello"
+        transport.close()
+        await witness.is_lost()
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+async def test_where_there_is_no_posix_the_same_url_opens_the_same_port(
+    monkeypatch: pytest.MonkeyPatch, backend: str
+) -> None:
+    async with pty(backend=backend) as (url, far):
+        witness = Witness()
+        transport = await open_elsewhere(url, lambda: witness)
+        assert not isinstance(transport, SerialLine)
+        await far.write(b"hello")
+        assert await witness.receives(5) == b"hello"
+        with pytest.raises(TransportError, match="is in use"):
+            await open_elsewhere(url, Witness)
+        transport.close()
+        await witness.is_lost()
+
+
 async def test_where_there_is_no_posix_a_cancelled_opening_closes_the_port() -> None:
     async with pty() as (url, _):
         witness = Witness()
         port = serial.Serial(TransportURL.parse(url).path, timeout=0)
-        opening = asyncio.create_task(connect_on_base(port, lambda: witness))
+        opening = asyncio.create_task(connect_on_pyserial(port, lambda: witness))
         await asyncio.sleep(0)
         opening.cancel()
         with pytest.raises(asyncio.CancelledError):
@@ -353,12 +419,167 @@ async def test_a_port_opens_with_9600_baud_8n1_without_handshake() -> None:
 
 
 async def test_every_option_reaches_the_port() -> None:
-    async with pty("?baudrate=4800&bytesize=7&parity=E&stopbits=2&rtscts=1&xonxoff=1&dsrdtr=1") as (url, _):
+    async with pty("&baudrate=4800&bytesize=7&parity=E&stopbits=2&rtscts=1&xonxoff=1&dsrdtr=1") as (url, _):
         port = await opens(url)
     assert (port.baudrate, port.bytesize, port.parity, port.stopbits) == (4800, 7, "E", 2)
     assert port.rtscts
     assert port.xonxoff
     assert port.dsrdtr
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+async def test_both_backends_set_a_port_alike(backend: str) -> None:
+    options = "&baudrate=4800&stopbits=2&rtscts=1&xonxoff=1"
+    async with pty(options, backend=backend) as (url, far):
+        witness = Witness()
+        transport = await open_transport(url, lambda: witness)
+        iflag, _, cflag, lflag, in_speed, out_speed, characters = termios.tcgetattr(transport.get_extra_info("serial"))
+        transport.abort()
+        await witness.is_lost()
+        assert await opens_again(url, far)
+    assert in_speed == out_speed == termios.B4800
+    assert cflag & (termios.CSTOPB | termios.CRTSCTS) == termios.CSTOPB | termios.CRTSCTS
+    assert iflag & (termios.IXON | termios.IXOFF | termios.IXANY) == termios.IXON | termios.IXOFF
+    assert not lflag & (termios.ECHO | termios.ICANON)
+    assert (characters[termios.VMIN], characters[termios.VTIME]) in {(1, 0), (b"\x01", b"\x00")}
+
+
+async def opens_again(url: str, far: DescriptorFarEnd) -> bool:
+    witness = Witness()
+    transport = await open_transport(url, lambda: witness)
+    await far.write(b"x")
+    await witness.receives(1)
+    transport.abort()
+    await witness.is_lost()
+    return True
+
+
+# --- serialx
+
+
+async def test_serialx_opens_the_port_where_it_is_installed() -> None:
+    async with pty() as (url, _):
+        assert isinstance(await opens(url.partition("?")[0]), serialx.Serial)
+        assert isinstance(await opens(url), serial.Serial)
+
+
+async def test_pyserial_opens_the_port_where_serialx_is_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:
+    serialx_is_not_installed(monkeypatch)
+    async with pty() as (url, _):
+        assert isinstance(await opens(url.partition("?")[0]), serial.Serial)
+
+
+async def test_serialx_that_is_asked_for_and_not_installed_says_how_to_install_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    serialx_is_not_installed(monkeypatch)
+    with pytest.raises(TransportError, match=r"backend=serialx cannot be used: .*pip install 'compax-aio\[serialx\]'"):
+        await open_transport("serial:///dev/ttyUSB0?backend=serialx", Witness)
+
+
+async def test_serialx_that_is_broken_says_so_instead_of_standing_aside(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "serialx.py").write_text("raise ImportError('no such symbol')")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "serialx")
+    with pytest.raises(TransportError, match=r"cannot be imported: ImportError: no such symbol; .*backend=pyserial"):
+        await open_transport("serial:///dev/ttyUSB0", Witness)
+
+
+async def test_a_backend_that_does_not_exist_says_which_do() -> None:
+    with pytest.raises(TransportError, match="backend is one of pyserial, serialx"):
+        await open_transport("serial:///dev/ttyUSB0?backend=other", Witness)
+
+
+async def test_a_setting_that_serialx_refuses_says_so_and_leaves_the_port_free() -> None:
+    async with pty(backend="serialx") as (url, _):
+        before = descriptors()
+        with pytest.raises(TransportError, match=r"refuses 9600 baud or the other settings: 1.5 stop bits"):
+            await open_transport(f"{url}&stopbits=1.5", Witness)
+        assert descriptors() == before
+        await opens(url)
+
+
+async def test_a_setting_that_the_system_refuses_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: Any) -> None:
+        raise termios.error(errno.EINVAL, "Invalid argument")
+
+    async with pty(backend="serialx") as (url, _):
+        before = descriptors()
+        monkeypatch.setattr(termios, "tcgetattr", refuse)
+        with pytest.raises(TransportError, match="refuses 9600 baud or the other settings"):
+            await open_transport(url, Witness)
+        assert descriptors() == before
+
+
+def serialx_is_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "serialx", None)
+
+
+# --- names that stay
+
+
+async def test_a_name_by_id_is_followed_anew_at_each_opening(tmp_path: Path) -> None:
+    by_id = tmp_path / "usb-FTDI_A50285BI-if00-port0"
+    async with pty() as (first, far_of_first), pty() as (second, far_of_second):
+        for url, far in ((first, far_of_first), (second, far_of_second)):
+            by_id.unlink(missing_ok=True)
+            by_id.symlink_to(TransportURL.parse(url).path)
+            assert await opens_again(f"serial://{by_id}", far)
+
+
+async def test_an_adapter_is_found_by_its_serial_number_wherever_it_is_plugged_in(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async with pty() as (first, far_of_first), pty() as (second, far_of_second):
+        paths = [TransportURL.parse(url).path for url in (first, second)]
+        for mine, other, far in ((paths[0], paths[1], far_of_first), (paths[1], paths[0], far_of_second)):
+            plugged_in(monkeypatch, {mine: "A50285BI", other: "FT9XK2A1", "/dev/ttyS0": None})
+            assert await opens_again("serial://?serial_number=A50285BI&baudrate=4800", far)
+
+
+async def test_a_serial_number_that_no_port_has_lists_those_there_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    plugged_in(monkeypatch, {"/dev/ttyUSB0": "FT9XK2A1", "/dev/ttyS0": None})
+    with pytest.raises(
+        TransportError,
+        match=r"no port has the serial number 'A50285BI'; ports of this computer: "
+        r"/dev/ttyS0 \(no serial number\), /dev/ttyUSB0 \(FT9XK2A1\)",
+    ):
+        await open_transport("serial://?serial_number=A50285BI", Witness)
+    plugged_in(monkeypatch, {})
+    with pytest.raises(TransportError, match="no port has the serial number 'A'; this computer has no serial port"):
+        await open_transport("serial://?serial_number=A", Witness)
+
+
+async def test_a_serial_number_that_several_ports_have_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    plugged_in(monkeypatch, {"/dev/ttyUSB1": "FT4", "/dev/ttyUSB0": "FT4"})
+    with pytest.raises(
+        TransportError, match=r"2 ports have the serial number 'FT4': /dev/ttyUSB0, /dev/ttyUSB1; .*/dev/serial/by-id"
+    ):
+        await open_transport("serial://?serial_number=FT4", Witness)
+
+
+async def test_ports_are_looked_for_in_a_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+    threads: list[threading.Thread] = []
+
+    def comports() -> list[Any]:
+        threads.append(threading.current_thread())
+        return []
+
+    monkeypatch.setattr("serial.tools.list_ports.comports", comports)
+    with pytest.raises(TransportError):
+        await open_transport("serial://?serial_number=A50285BI", Witness)
+    assert threads
+    assert threading.main_thread() not in threads
+
+
+def plugged_in(monkeypatch: pytest.MonkeyPatch, serial_numbers: dict[str, str | None]) -> None:
+    ports = [
+        SimpleNamespace(device=device, description=None, manufacturer=None, serial_number=number)
+        for device, number in serial_numbers.items()
+    ]
+    monkeypatch.setattr("serial.tools.list_ports.comports", lambda: ports)
 
 
 @pytest.mark.parametrize(
@@ -378,12 +599,13 @@ async def test_an_option_that_makes_no_sense_says_what_is_allowed(option: str, a
         await open_transport(f"serial:///dev/null?{option}", Witness)
 
 
-async def test_a_missing_port_lists_those_that_exist(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("backend", BACKENDS)
+async def test_a_missing_port_lists_those_that_exist(monkeypatch: pytest.MonkeyPatch, backend: str) -> None:
     computer_has(monkeypatch, "/dev/ttyUSB1", "/dev/ttyUSB0")
     with pytest.raises(
         TransportError, match="no serial port /dev/ttyUSB7; ports of this computer: /dev/ttyUSB0, /dev/ttyUSB1"
     ):
-        await open_transport("serial:///dev/ttyUSB7", Witness)
+        await open_transport(f"serial:///dev/ttyUSB7?backend={backend}", Witness)
 
 
 async def test_a_missing_port_says_so_when_there_is_none_at_all(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -392,10 +614,12 @@ async def test_a_missing_port_says_so_when_there_is_none_at_all(monkeypatch: pyt
         await open_transport("serial://COM3", Witness)
 
 
-async def test_a_port_that_is_open_already_is_in_use() -> None:
-    async with opened() as (transport, _, _):
+@pytest.mark.parametrize("second", BACKENDS)
+@pytest.mark.parametrize("first", BACKENDS)
+async def test_a_port_that_is_open_already_is_in_use(first: str, second: str) -> None:
+    async with opened(backend=first) as (transport, _, _):
         with pytest.raises(TransportError, match=r"the serial port .* is in use; end the program"):
-            await open_transport(f"serial://{transport.serial.port}", Witness)
+            await open_transport(f"serial://{transport.serial.port}?backend={second}", Witness)
 
 
 async def test_a_port_that_was_closed_is_free_as_soon_as_the_connection_is_lost() -> None:
@@ -404,11 +628,12 @@ async def test_a_port_that_was_closed_is_free_as_soon_as_the_connection_is_lost(
             await opens(url)
 
 
-async def test_a_file_is_no_serial_port(tmp_path: Path) -> None:
+@pytest.mark.parametrize("backend", BACKENDS)
+async def test_a_file_is_no_serial_port(tmp_path: Path, backend: str) -> None:
     (tmp_path / "file").touch()
     for path in (tmp_path, tmp_path / "file"):
         with pytest.raises(TransportError, match=f"{path} is not a serial port; give the path of a device"):
-            await open_transport(f"serial://{path}", Witness)
+            await open_transport(f"serial://{path}?backend={backend}", Witness)
 
 
 @pytest.mark.parametrize(
@@ -432,17 +657,22 @@ async def test_a_port_without_permission_says_how_to_get_it(
     monkeypatch.setattr("grp.getgrgid", getgrgid)
     monkeypatch.setattr(Path, "stat", lambda *_, **__: SimpleNamespace(st_gid=1, st_mode=stat.S_IFCHR | mode))
     with pytest.raises(TransportError, match=f"no permission to open the serial port /dev/ttyUSB0; .*{hint}"):
-        await open_transport("serial:///dev/ttyUSB0", Witness)
+        await open_transport("serial:///dev/ttyUSB0?backend=pyserial", Witness)
 
 
 @pytest.mark.parametrize(
     "error",
-    [termios.error(22, "Invalid argument"), ValueError("Failed to set custom baud rate (12345)"), OverflowError()],
+    [
+        termios.error(22, "Invalid argument"),
+        OSError(errno.EINVAL, "Invalid argument"),
+        ValueError("Failed to set custom baud rate (12345)"),
+        OverflowError(),
+    ],
 )
 async def test_a_baud_rate_that_the_driver_refuses_says_so(monkeypatch: pytest.MonkeyPatch, error: Exception) -> None:
     refuses_to_open(monkeypatch, error)
     with pytest.raises(TransportError, match=r"/dev/ttyUSB0 refuses 12345 baud or the other settings.*standard baud"):
-        await open_transport("serial:///dev/ttyUSB0?baudrate=12345", Witness)
+        await open_transport("serial:///dev/ttyUSB0?baudrate=12345&backend=pyserial", Witness)
 
 
 @pytest.mark.parametrize(
@@ -458,11 +688,17 @@ async def test_an_error_without_a_number_is_understood_by_its_text(
 ) -> None:
     refuses_to_open(monkeypatch, error)
     with pytest.raises(TransportError, match=message):
-        await open_transport("serial://COM3", Witness)
+        await open_transport("serial://COM3?backend=pyserial", Witness)
 
 
 @pytest.mark.parametrize(
-    ("url", "what"), [("serial://", "names no serial port"), ("serial://dev/ttyUSB0", "names two ports")]
+    ("url", "what"),
+    [
+        ("serial://", "names no serial port"),
+        ("serial://?serial_number=", "names no serial port"),
+        ("serial://dev/ttyUSB0", "names two ports"),
+        ("serial:///dev/ttyUSB0?serial_number=A", "names two ports"),
+    ],
 )
 async def test_a_path_takes_three_slashes(url: str, what: str) -> None:
     with pytest.raises(TransportError, match=f"{what}; .*with three slashes before a path"):

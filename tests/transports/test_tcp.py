@@ -101,6 +101,52 @@ async def test_a_silent_host_says_so_after_the_time_that_was_asked_for(monkeypat
     assert asyncio.get_running_loop().time() == pytest.approx(2.5, abs=0.1)
 
 
+@pytest.mark.parametrize("scheme", ["tcp", "tls", "rfc2217"])
+async def test_a_name_that_nobody_resolves_costs_no_more_time_than_was_asked_for(
+    monkeypatch: pytest.MonkeyPatch, scheme: str
+) -> None:
+    async def getaddrinfo(*_: object, **__: object) -> list[Any]:
+        await asyncio.sleep(3600)
+        return []
+
+    monkeypatch.setattr(asyncio.get_running_loop(), "getaddrinfo", getaddrinfo)
+    with pytest.raises(TransportError, match=r"moxa port 4001 did not answer within 1.5 s"):
+        await open_transport(f"{scheme}://moxa:4001?connect_timeout_s=1.5", Witness)
+    assert asyncio.get_running_loop().time() == pytest.approx(1.5, abs=0.1)
+
+
+@pytest.mark.parametrize("scheme", ["tls", "rfc2217"])
+async def test_greetings_have_only_the_time_that_connecting_has_left(
+    monkeypatch: pytest.MonkeyPatch, scheme: str
+) -> None:
+    loop = asyncio.get_running_loop()
+    really_connect = loop.sock_connect
+
+    async def sock_connect(sock: socket.socket, address: Any) -> None:
+        await asyncio.sleep(1)
+        await really_connect(sock, address)
+
+    async with listening_on_tcp() as (port, _):
+        monkeypatch.setattr(loop, "sock_connect", sock_connect)
+        with pytest.raises(TransportError, match=r"127.0.0.1 port .* took the connection, but .* within 1.5 s"):
+            await open_transport(f"{scheme}://127.0.0.1:{port}?connect_timeout_s=1.5", Witness)
+        assert loop.time() == pytest.approx(1.5, abs=0.1)
+
+
+@pytest.mark.parametrize("scheme", ["tcp", "tls", "rfc2217"])
+@pytest.mark.parametrize("timeout_s", ["0", "-1", "nan", "inf", "x", "1e9"])
+async def test_a_time_out_that_is_none_is_refused(scheme: str, timeout_s: str) -> None:
+    with pytest.raises(TransportError, match="connect_timeout_s is a number above 0 and up to 3600"):
+        await open_transport(f"{scheme}://127.0.0.1:1?connect_timeout_s={timeout_s}", Witness)
+
+
+@pytest.mark.parametrize("scheme", ["tcp", "tls", "rfc2217"])
+async def test_a_password_in_a_url_is_refused_and_not_shown(scheme: str) -> None:
+    with pytest.raises(TransportError, match="takes no user name or password") as caught:
+        await open_transport(f"{scheme}://me:sesame@127.0.0.1:1", Witness)
+    assert "sesame" not in str(caught.value)
+
+
 async def test_any_other_trouble_is_told_as_the_system_tells_it(monkeypatch: pytest.MonkeyPatch) -> None:
     fails_to_connect(monkeypatch, OSError(errno.EADDRNOTAVAIL, "strange trouble"))
     with pytest.raises(TransportError, match=r"10.9.8.7 port 4001 could not be connected to.*strange trouble"):

@@ -6,12 +6,12 @@ import asyncio
 import socket
 import tempfile
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 
 import pytest
 from tests.conformance.far_ends import FarEnd, StreamFarEnd
-from tests.conformance.transport import TransportConformance, Witness
+from tests.conformance.transport import TransportConformance, Witness, descriptors
 
 from compax_aio.errors import TransportError
 from compax_aio.transports import open_transport
@@ -58,6 +58,26 @@ async def test_a_socket_that_is_not_ours_says_so(monkeypatch: pytest.MonkeyPatch
         await open_transport("unix:///run/drive.sock", Witness)
 
 
+async def test_a_program_that_takes_no_more_connections_says_so(tmp_path: Path) -> None:
+    """asyncio by itself takes such a socket for connected, and loses it at the first byte."""
+    with socket.socket(socket.AF_UNIX) as listening:
+        listening.bind(f"{tmp_path}/busy.sock")
+        listening.listen(0)
+        before = descriptors()
+        async with asyncio.timeout(10), AsyncExitStack() as lines:
+
+            async def fill_the_queue() -> None:
+                for _ in range(20):
+                    witness = Witness()
+                    transport = await open_transport(f"unix://{tmp_path}/busy.sock", lambda: witness)  # noqa: B023
+                    lines.push_async_callback(witness.is_lost)
+                    lines.callback(transport.abort)
+
+            with pytest.raises(TransportError, match=r"busy.sock takes no more connections; does it hang"):
+                await fill_the_queue()
+        assert descriptors() == before
+
+
 async def test_any_other_trouble_is_told_as_the_system_tells_it() -> None:
     with pytest.raises(TransportError, match=r"could not be connected to: .*too long"):
         await open_transport(f"unix:///{'x' * 500}", Witness)
@@ -82,7 +102,8 @@ async def open_nothing() -> None:
 
 
 def fails_to_connect(monkeypatch: pytest.MonkeyPatch, error: OSError) -> None:
-    async def sock_connect(sock: socket.socket, address: object) -> None:
-        raise error
+    class Failing(socket.socket):
+        def connect(self, address: object) -> None:
+            raise error
 
-    monkeypatch.setattr(asyncio.get_running_loop(), "sock_connect", sock_connect)
+    monkeypatch.setattr(socket, "socket", Failing)

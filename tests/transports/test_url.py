@@ -92,10 +92,54 @@ def test_a_password_is_never_shown() -> None:
     assert url.text.startswith("ssh://user:sec:ret@")
 
 
-@pytest.mark.parametrize("text", ["ssh://user:secret@moxa:x", "user:secret@moxa", "ssh://user:secret@h?a=1&a=2"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "ssh://user:secret@moxa:x",
+        "user:secret@moxa",
+        "ssh://user:secret@h?a=1&a=2",
+        "ssh://user:secret/word@moxa:22",
+        "ssh://user:word/secret@moxa:22",
+        "ssh://user:secret?a@moxa",
+        "ssh://user:a?secret@moxa",
+        "ssh://user:secret%@moxa/%",
+        "ssh://user:1?x=%secret@moxa",
+    ],
+)
 def test_a_malformed_url_does_not_show_its_password_either(text: str) -> None:
     with pytest.raises(TransportError) as caught:
         parse(text)
+    assert "secret" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "text", ["ssh://user:4001/secret@moxa:22", "ssh://moxa/user:secret@x", "ssh://user:1/se:cret@h"]
+)
+def test_a_password_that_has_become_part_of_the_path_is_not_shown(text: str) -> None:
+    url = parse(text)
+    assert "cret" not in str(url) + repr(url)
+    with pytest.raises(TransportError) as caught:
+        url.expect("ssh://host", host=True, port=True)
+    assert "cret" not in str(caught.value)
+
+
+def test_options_that_are_secret_by_their_name_are_not_shown() -> None:
+    url = parse("vpn://gate?user=me&password=sesame&api%54oken=sesame&keyfile=/k.pem&clientSecret=sesame")
+    assert str(url) == "vpn://gate?user=me&password=***&api%54oken=***&keyfile=/k.pem&clientSecret=***"
+    assert "sesame" not in repr(url)
+    assert url.query["password"] == "sesame"
+    with pytest.raises(TransportError, match="has no option 'password'") as caught:
+        url.expect("vpn://host", host=True, query=("user",))
+    assert "sesame" not in str(caught.value)
+    with pytest.raises(TransportError, match=r"password='\*\*\*' is not allowed") as caught:
+        url.flag("password")
+    assert "sesame" not in str(caught.value)
+
+
+@pytest.mark.parametrize("text", ["tcp://user:secret@moxa:4001", "tcp://user@moxa:4001", "tcp://@moxa:4001"])
+def test_a_user_or_password_that_would_be_ignored_is_refused(text: str) -> None:
+    with pytest.raises(TransportError, match="tcp:// takes no user name or password; write it as form") as caught:
+        parse(text).expect("form", host=True, port=True)
     assert "secret" not in str(caught.value)
 
 

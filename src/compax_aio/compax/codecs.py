@@ -36,15 +36,20 @@ __all__ = [
     "value_text",
 ]
 
-# Blanks may stand anywhere (UG p. 160), between a sign and its number too; digits behind a letter are a name: "E92".
-_NUMBER: Final = re.compile(r"(?<![A-Za-z\d.])([-+]?)\s*(\d+(?:\.\d*)?|\.\d+)")
-# Behind it a unit, or nothing: "1,5", "1 234.56" and "1.5E3" are numbers that would be misread.
-_BEHIND_NUMBER: Final = re.compile(r"(?![eE][-+]?\d)(?:\s*[^\d\s.,'+-]\S*)*\s*")
-_HEAD: Final = re.compile(r"[SPVN]\d+\s*[:=]?|[:=]")
+# Blanks may stand anywhere (UG p. 160), between a sign and its number too. Nothing else stands before it: what has lost
+# a digit on the line is another number.
+_NUMBER: Final = re.compile(r"[ \t:=]*([-+]?)[ \t]*([0-9]+(?:\.[0-9]*)?|\.[0-9]+)")
+# Behind it a unit, or nothing: "1,5", "1 234.56", "1.5E3" and "1x2.50" are numbers that would be misread. There is only
+# one way to take a text apart so: it comes from a line, and to try many could take for ever.
+_BEHIND_NUMBER: Final = re.compile(
+    r"(?![eE][-+]?\d)(?:[^\d\s.,'+-][^\d\s.,'+/]*(?:/[^\d\s.,'+]*\d?)?)?(?:\s+[^\d\s.,'+-]\S*)*\s*"
+)
+_HEAD: Final = re.compile(r"[SPVN][0-9]+[ \t]*[:=]?|[:=]")
+_BLANKS: Final = " \t"
 _ACTIVE_BIT: Final = next(bit.bit for bit in S17_BITS if bit.name == "command_active")
 _BITS: Final = re.compile(r"[01]{8}")
-_WHOLE: Final = re.compile(r"[-+]?\d{1,15}")
-_BROKEN: Final = re.compile(r"[-+]?(?:\d{1,15}\.\d*|\.\d+)")
+_WHOLE: Final = re.compile(r"[-+]?[0-9]{1,15}")
+_BROKEN: Final = re.compile(r"[-+]?(?:[0-9]{1,15}\.[0-9]*|\.[0-9]+)")
 _FACTS: Final = {fact.number: fact for fact in STATUS_VALUES}
 
 
@@ -195,20 +200,20 @@ class HistoryEntry:
 
 def value_text(answer: str) -> str:
     """Return what stands behind the colon of an answer, or behind its number where there is no colon."""
-    answer = answer.strip()
+    answer = answer.strip(_BLANKS)
     head = _HEAD.match(answer)
-    return answer[head.end() :].strip() if head else answer
+    return answer[head.end() :].strip(_BLANKS) if head else answer
 
 
 def decode_number(answer: str) -> float:
     """
-    Return the first signed decimal number behind the colon; padding, a plus sign and a unit are allowed.
+    Return the signed decimal number behind the colon; padding, a plus sign and a unit are allowed.
 
     Raises:
         UnexpectedAnswerError: There is none.
     """
     text = value_text(answer)
-    found = _NUMBER.search(text)
+    found = _NUMBER.match(text)
     if found is None or not _BEHIND_NUMBER.fullmatch(text, found.end()):
         raise UnexpectedAnswerError("the answer holds no number that is understood", received=answer)
     return float(found[1] + found[2])
@@ -231,7 +236,7 @@ def decode_status_value(number: int, answer: str, axis_unit: str) -> StatusValue
     elif fact.form is Form.BITS:
         value = _bits(answer)
     elif fact.form in (Form.HISTORY, Form.PAIR):
-        value = tuple(decode_codes(answer))
+        value = decode_codes(answer)
     else:
         value = _number_or_text(raw)
     return StatusValue(
@@ -343,7 +348,7 @@ def _bits(answer: str) -> str:
 
 def decode_codes(answer: str) -> tuple[int, ...]:
     """Return the codes and marks of S18, newest first, or of S30, as they are (UG p. 209)."""
-    codes = re.findall(r"\d+", value_text(answer))
+    codes = re.findall("[0-9]+", value_text(answer))
     if not codes:
         raise UnexpectedAnswerError("the answer holds no error code (UG p. 209)", received=answer)
     return tuple(map(int, codes))

@@ -6,6 +6,7 @@ from collections.abc import Generator
 from types import TracebackType
 from typing import Any
 
+from ..escaping import escaped
 from ..transports.url import TransportURL
 from .drive import Drive
 from .settings import DriveSettings
@@ -23,7 +24,7 @@ def connect(url: str, *, name: str | None = None, settings: DriveSettings | None
     Args:
         url: ``serial:///dev/ttyUSB0?baudrate=9600``, ``tcp://host:4001``, ``unix:///run/drive.sock``,
             ``loop://name``, ``sim://compax``, or a scheme that a plugin adds.
-        name: For errors, logs and results; the URL without its query if not given.
+        name: For errors, logs and results; the URL if not given, without its query unless that alone names the line.
         settings: Time-outs and what is known of this drive's ways.
 
     Raises (when awaited or entered):
@@ -31,7 +32,11 @@ def connect(url: str, *, name: str | None = None, settings: DriveSettings | None
         UnexpectedAnswerError: Another device answers, such as a Compax3.
         AnswerTimeoutError: Nothing on it answers as a COMPAX would.
     """
-    return Connecting(url, name or str(TransportURL.parse(url)).partition("?")[0], settings or DriveSettings())
+    if name is None:
+        shown = str(TransportURL.parse(url))
+        name = shown if "://?" in shown else shown.partition("?")[0]
+    name = escaped(name)
+    return Connecting(url, name, settings or DriveSettings())
 
 
 class Connecting:

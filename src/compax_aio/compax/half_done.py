@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from ..errors import CommandRejectedError, InvalidCommandError, RestoreIncompleteError
+from ..escaping import escaped
 
 __all__ = ["HalfDone", "RollBack"]
 
@@ -82,9 +83,10 @@ class HalfDone:
 
     def tell_with(self, error: BaseException, report: RestoreIncompleteError) -> None:
         """Say in *error*, a cancellation or a caller's own, what it has left; it may be swallowed on its way."""
-        error.add_note(f"{report.device}: {report.what}")
+        told = escaped(f"{report.device}: {report.what}")
+        error.add_note(told)
         if self.has_changed:
-            _log.warning("%s: %s", report.device, report.what)
+            _log.warning("%s", told)
 
     def _names(self, numbers: Iterable[int]) -> str:
         return ", ".join(map(self._name, numbers)) or "none"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections import deque
+from collections import Counter, deque
 from dataclasses import dataclass
 from typing import Final
 
@@ -47,11 +47,17 @@ class Sent:
 
 
 class Ledger:
-    """Unanswered lines; the oldest is forgotten when there are very many."""
+    """Unanswered lines; the oldest is forgotten when there are very many, and looking for one takes no longer then."""
 
     def __init__(self) -> None:
-        self._lines: deque[Sent] = deque(maxlen=_MAX_LEDGER)
         self._next_marker = 0
+        self._lines: deque[Sent] = deque()
+        self._commands: deque[Sent] = deque()
+        """Those of them that a bare prompt may belong to."""
+        self._owed: deque[Sent] = deque()
+        """Those whose ``$`` was asked for."""
+        self._asked: Counter[tuple[str, str]] = Counter()
+        """How many queries bear each name."""
 
     def __len__(self) -> int:
         return len(self._lines)
@@ -64,40 +70,63 @@ class Ledger:
     @property
     def only_command(self) -> Sent | None:
         """The command that a bare prompt belongs to; None if there is none, or several."""
-        commands = [sent for sent in self._lines if sent.key is None]
-        return commands[0] if len(commands) == 1 else None
+        return self._commands[0] if len(self._commands) == 1 else None
 
     def asked(self, key: tuple[str, str]) -> Sent | None:
         """Find the oldest query that an answer beginning with *key* can belong to."""
-        return next((sent for sent in self._lines if sent.key == key), None)
+        return next((sent for sent in self._lines if sent.key == key), None) if self._asked[key] else None
 
     def owed_message(self) -> Sent | None:
         """Find the oldest command whose ``$`` was asked for."""
-        return next((sent for sent in self._lines if sent.wants_message), None)
+        return self._owed[0] if self._owed else None
 
     def note(self, text: str, wire: bytes) -> None:
         """Take note of a line that was sent."""
-        self._lines.append(Sent.of(text, wire))
+        if len(self._lines) >= _MAX_LEDGER:
+            self._forget_oldest()
+        self._add(Sent.of(text, wire))
 
     def settle(self) -> None:
         """Forget all: it is answered, refused or lost."""
-        self._lines.clear()
+        for each in (self._lines, self._commands, self._owed, self._asked):
+            each.clear()
 
     def settle_up_to(self, sent: Sent) -> None:
         """Forget *sent* and all that is older."""
-        while self._lines.popleft() is not sent:
+        while self._forget_oldest() is not sent:
             pass
 
     def forget_commands(self) -> None:
         """Forget what a bare prompt could be credited to; queries are known by their answers."""
-        self._lines = deque((sent for sent in self._lines if sent.key), maxlen=_MAX_LEDGER)
+        queries = [sent for sent in self._lines if sent.key]
+        self.settle()
+        for sent in queries:
+            self._add(sent)
+
+    def _add(self, sent: Sent) -> None:
+        self._lines.append(sent)
+        if sent.key is None:
+            self._commands.append(sent)
+        else:
+            self._asked[sent.key] += 1
+        if sent.wants_message:
+            self._owed.append(sent)
+
+    def _forget_oldest(self) -> Sent:
+        sent = self._lines.popleft()
+        if sent.key is None:
+            self._commands.popleft()
+        else:
+            self._asked[sent.key] -= 1
+        if sent.wants_message:
+            self._owed.popleft()
+        return sent
 
     def choose_marker(self) -> str:
         """Return a status query whose number no unanswered line bears, as long as there is one."""
-        unanswered = {sent.key for sent in self._lines}
         for _ in MARKERS:
             number = MARKERS[self._next_marker % len(MARKERS)]
             self._next_marker += 1
-            if ("S", str(number)) not in unanswered:
+            if not self._asked["S", str(number)]:
                 break
         return f"S{number}"

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import asyncio
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Final, TypeAlias
+from typing import Final, NoReturn, TypeAlias
 
 from ..errors import InvalidCommandError
+from ..escaping import shown
+from ..text_file import MAX_BYTES, read_text
 from .program.records import Record
 
 __all__ = ["ListingSource", "load_listing"]
 
 ListingSource: TypeAlias = Path | str | Mapping[int, Record] | Iterable[str]
 """A file or its name; a listing; its lines; or records by number."""
-
-_MAX_BYTES: Final = 256 * 1024
-"""Of a file; so many characters may a text have."""
 
 _BYTE_ORDER_MARK: Final = "\ufeff"
 _LISTING: Final = re.compile(r"\s*[Nn]\s*[0-9]|.*[\r\n]|\s*$")
@@ -36,27 +35,32 @@ async def load_listing(source: ListingSource) -> str | Mapping[int, Record]:
     """
     if isinstance(source, Mapping):
         return source
-    if isinstance(source, str) and _LISTING.match(source.removeprefix(_BYTE_ORDER_MARK)):
-        return _as_text(source)
+    if isinstance(source, str):
+        source = str.__str__(source)
+        if _LISTING.match(source.removeprefix(_BYTE_ORDER_MARK)):
+            return _as_text(source)
     if isinstance(source, str | Path):
-        return await asyncio.get_running_loop().run_in_executor(None, _read_file, Path(source))
-    return _as_text("\n".join(source))
+        return await asyncio.get_running_loop().run_in_executor(None, read_text, Path(source), "listing")
+    return _as_text("\n".join(_bounded(source)))
+
+
+def _bounded(lines: Iterable[str]) -> Iterator[str]:
+    """Take *lines* one by one: somebody's own may have no end."""
+    length = 0
+    for line in lines:
+        if not isinstance(line, str):
+            raise InvalidCommandError(f"a line of a listing is a text, not {shown(line)}")
+        yield str.__str__(line)
+        length += len(line) + 1
+        if length > MAX_BYTES:
+            _refuse_length()
 
 
 def _as_text(text: str) -> str:
-    if len(text) > _MAX_BYTES:
-        raise InvalidCommandError(f"the text is larger than any listing: more than {_MAX_BYTES} characters")
+    if len(text) > MAX_BYTES:
+        _refuse_length()
     return text.removeprefix(_BYTE_ORDER_MARK)
 
 
-def _read_file(path: Path) -> str:
-    if "\0" in str(path):
-        raise InvalidCommandError(f"{str(path)!r:.60} is neither a listing nor the name of a file")
-    with path.open("rb") as file:
-        data = file.read(_MAX_BYTES + 1)
-    if len(data) > _MAX_BYTES:
-        raise InvalidCommandError(f"{path} is larger than any listing: more than {_MAX_BYTES} bytes")
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InvalidCommandError(f"{path} is no listing: {error}") from error
+def _refuse_length() -> NoReturn:
+    raise InvalidCommandError(f"the text is larger than any listing: more than {MAX_BYTES} characters")

@@ -17,11 +17,12 @@ from ..errors import (
     RestoreIncompleteError,
     UnexpectedAnswerError,
 )
+from ..escaping import shown
 from .codecs import decode_number
 from .facts.parameters import MAX_DIGITS
 from .half_done import HalfDone, RollBack
 from .line import DriveLine
-from .plain_line import check_line
+from .plain_line import as_index, check_line
 from .value_file import read_file, write_file
 from .value_tables import ValueTable
 from .vocabulary import check_number
@@ -97,6 +98,8 @@ class NumberedValues:
         return await self._write(number, value)
 
     async def _write(self, number: int, value: float, on_sent: Callable[[], None] | None = None) -> float:
+        number = self._index(number)
+        value = check_number(self._name(number), value)
         text = self._written(number, value)
 
         def sent() -> None:
@@ -303,12 +306,16 @@ class NumberedValues:
         return f"{fact.meaning} [{unit}]" if unit else fact.meaning
 
     def _name(self, number: int) -> str:
-        if isinstance(number, bool) or not isinstance(number, int) or number not in self._table.decimals:
+        return f"{self._table.letter}{self._index(number)}"
+
+    def _index(self, number: int) -> int:
+        index = as_index(number)
+        if index is None or index not in self._table.decimals:
             raise InvalidCommandError(
-                f"there is no {self._table.letter}{number!r} among the {self._table.kind} of a COMPAX",
+                f"there is no {self._table.letter}{shown(number)} among the {self._table.kind} of a COMPAX",
                 hint="there are P1 to P250, V1 to V39 and V50 to V70 (IBS p. 12, 24, UG p. 104)",
             )
-        return f"{self._table.letter}{number}"
+        return index
 
     def _rounded(self, number: int, value: float) -> float:
         return round(check_number(self._name(number), value), self._table.decimals[number]) + 0.0
@@ -316,10 +323,10 @@ class NumberedValues:
     def _written(self, number: int, value: float) -> str:
         rounded, decimals = self._rounded(number, value), self._table.decimals[number]
         if abs(rounded - float(value)) > 1e-9 * max(1.0, abs(rounded)):
-            raise InvalidCommandError(f"{self._name(number)} has {decimals} decimals (IBS p. 24), not {value!r}")
+            raise InvalidCommandError(f"{self._name(number)} has {decimals} decimals (IBS p. 24), not {shown(value)}")
         if abs(rounded) >= 10**MAX_DIGITS:
             raise InvalidCommandError(
-                f"{self._name(number)} cannot be {value!r}: a number has {MAX_DIGITS} digits before the point "
+                f"{self._name(number)} cannot be {shown(value)}: a number has {MAX_DIGITS} digits before the point "
                 "(UG p. 158)"
             )
         template = self._line.settings.dialect.write_value

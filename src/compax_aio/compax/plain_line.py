@@ -7,9 +7,10 @@ from collections.abc import Iterable
 from typing import Final
 
 from ..errors import InvalidCommandError
+from ..escaping import shown
 from .facts.line import ECHO_SIGN, EXECUTE_SIGN, MAX_LINE_LENGTH, POSITION_REACHED_SIGN, STORE_SIGN
 
-__all__ = ["check_line", "is_positioning", "is_query", "starts_motion"]
+__all__ = ["as_index", "check_line", "is_positioning", "is_query", "starts_motion"]
 
 _SIGNS: Final = frozenset({POSITION_REACHED_SIGN, STORE_SIGN, EXECUTE_SIGN, ECHO_SIGN, ">"})
 _QUERY: Final = re.compile(r"[SPVN]\d{1,3}")
@@ -27,28 +28,37 @@ def check_line(text: str, *, room_for_sign: bool = False) -> str:
             ASCII, or holds a character that carries meaning: CR, LF, ``$ ? ! , >``.
     """
     if not isinstance(text, str):
-        raise InvalidCommandError(f"a line is a text, not {text!r}")
-    line = text.strip(" ")
+        raise InvalidCommandError(f"a line is a text, not {shown(text)}")
+    line = str.strip(text, " ")  # not as somebody's own kind of text would do it
     for character in line:
         if character in _SIGNS:
             raise InvalidCommandError(
-                f"{character!r} in {text!r} is a sign of the line, not part of a command",
+                f"{character!r} in {shown(line)} is a sign of the line, not part of a command",
                 hint="moves ask for their message themselves; send one plain command at a time",
             )
         if not " " <= character <= "~":
             raise InvalidCommandError(
-                f"{character!r} in {text!r} cannot be sent: a line is printable ASCII (UG p. 160)",
+                f"{character!r} in {shown(line)} cannot be sent: a line is printable ASCII (UG p. 160)",
                 hint="send one command at a time, without its end sign",
             )
     longest = MAX_LINE_LENGTH - room_for_sign
     if not line or len(line) > longest:
         raise InvalidCommandError(
-            f"{text!r} has {len(line)} characters; the drive's entry buffer takes 1 to {longest} (UG p. 160)",
+            f"{shown(line)} has {len(line)} characters; the drive's entry buffer takes 1 to {longest} (UG p. 160)",
             hint="use the short forms of the commands (PA, PR, SD, AL, OT) and leave out blanks"
             if line
             else "an empty line is never sent: its CR executes what stands in the drive's buffer",
         )
     return line
+
+
+def as_index(number: object) -> int | None:
+    """
+    Return *number* if it is a whole number, and no flag, as a plain one; else None.
+
+    A member of an enumeration may be one, and would write itself into a line by its name.
+    """
+    return int.__int__(number) if isinstance(number, int) and not isinstance(number, bool) else None
 
 
 def is_query(line: str) -> bool:

@@ -19,17 +19,19 @@ from ..errors import (
     RestoreIncompleteError,
     UnexpectedAnswerError,
 )
+from ..escaping import escaped, shown
+from ..text_file import replace_file
 from .codecs import value_text
 from .facts.program_commands import RECORD_NUMBERS, RECORD_TEMPLATE
 from .half_done import HalfDone, RollBack
 from .listing_source import ListingSource, load_listing
 from .numbered_values import Progress
+from .plain_line import as_index
 from .program import check, listing, parse, parse_record, raise_for_errors, record_text, wire_line
 from .program.problems import Problem, Severity
 from .program.records import End, MoveTo, Program, Record
 from .program.shown import Shown, compare, read_shown, superfluous_ends
 from .program_run import ProgramRun, check_record_number
-from .value_file import replace_file
 
 __all__ = ["Downloaded", "ProgramMemory", "Uploaded", "WrittenRecord"]
 
@@ -58,8 +60,8 @@ class Uploaded:
         """Print it in the manual's style (UG p. 95); what could not be read stands in comments."""
         lines = {number: listing({number: record}) for number, record in self.program.items()}
         for number, text in self.unreadable.items():
-            shown = RECORD_TEMPLATE.format(n=number, text=text)
-            lines[number] = f"; {shown}  ; cannot be read, or may be cut at 30 characters (IBS p. 54)\n"
+            line = RECORD_TEMPLATE.format(n=number, text=escaped(text))
+            lines[number] = f"; {line}  ; cannot be read, or may be cut at 30 characters (IBS p. 54)\n"
         return "".join(lines[number] for number in sorted(lines))
 
 
@@ -147,7 +149,8 @@ class ProgramMemory(ProgramRun):
             UnexpectedAnswerError: The drive took it, and shows something else.
             AnswerTimeoutError: Whether the drive took it is unknown; the hint says what the record shows.
         """
-        checked = self._checked_record(check_record_number(number), record)
+        number = check_record_number(number)
+        checked = self._checked_record(number, record)
         await self._refuse_while_busy(_name(number))
         return await self._write(number, checked)
 
@@ -201,7 +204,7 @@ class ProgramMemory(ProgramRun):
             OSError: The file cannot be written.
         """
         uploaded = await self.upload(on_progress=on_progress)
-        name = "".join(character if character.isprintable() else "?" for character in self._line.name)
+        name = escaped(self._line.name)
         at = datetime.now(UTC).isoformat(timespec="seconds")
         text = f"; Program of {name}, a COMPAX drive, as it showed it; saved at {at}\n{uploaded.listing()}"
         await asyncio.get_running_loop().run_in_executor(None, replace_file, Path(path), text)
@@ -302,14 +305,16 @@ class ProgramMemory(ProgramRun):
         return value_text(answer).rjust(len(answer) - len(RECORD_TEMPLATE.format(n=number, text="")))
 
     def _checked_record(self, number: int, record: str | Record) -> Record:
-        text = record if isinstance(record, str) else record_text(record)
+        text = str.__str__(record) if isinstance(record, str) else record_text(record)
         checked = parse_record(text, decimals=self._decimals)
         if not isinstance(record, str) and checked != record:
-            raise InvalidCommandError(f"{record!r} cannot be said to the drive: {text!r} means {checked!r}")
+            raise InvalidCommandError(f"{shown(record)} cannot be said to the drive: {shown(text)} means {checked!r}")
         wire_line(number, checked, template=self._template)
         return checked
 
     def _checked_program(self, source: str | Mapping[int, Record]) -> tuple[Program, tuple[Problem, ...]]:
+        if not isinstance(source, str):
+            source = _by_plain_numbers(source)
         text = source if isinstance(source, str) else listing(source)
         problems = check(text, decimals=self._decimals, template=self._template)
         raise_for_errors(problems)
@@ -393,6 +398,14 @@ class ProgramMemory(ProgramRun):
             "roll_back() what was written",
             exchanges=told.exchanges if told else self._line.link.recent(),
         )
+
+
+def _by_plain_numbers(records: Mapping[int, Record]) -> dict[int, Record]:
+    """Return *records* by numbers that write themselves as numbers; that they exist is looked at with all the rest."""
+    plain = {as_index(number): record for number, record in records.items()}
+    if None in plain or len(plain) < len(records):
+        raise InvalidCommandError(f"records have whole numbers, each once, not {shown([*records])}")
+    return {number: record for number, record in plain.items() if number is not None}
 
 
 def _name(number: int) -> str:

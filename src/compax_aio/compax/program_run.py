@@ -19,11 +19,13 @@ from ..errors import (
     MoveTimeoutError,
     UnexpectedAnswerError,
 )
+from ..escaping import shown
 from ..link.contract import Lane
 from .codecs import DriveStatus
 from .facts.program_commands import RECORD_NUMBERS
 from .motion import Motion
 from .observer import Observer
+from .plain_line import as_index, check_line
 from .vocabulary import check_number
 
 __all__ = ["ProgramRun", "check_record_number"]
@@ -38,9 +40,10 @@ def check_record_number(number: object) -> int:
     Raises:
         InvalidCommandError: Records are 1 to 250 (UG p. 95).
     """
-    if isinstance(number, bool) or not isinstance(number, int) or number not in RECORD_NUMBERS:
-        raise InvalidCommandError(f"there is no record {number!r}", hint="records are 1 to 250 (UG p. 95)")
-    return number
+    index = as_index(number)
+    if index is None or index not in RECORD_NUMBERS:
+        raise InvalidCommandError(f"there is no record {shown(number)}", hint="records are 1 to 250 (UG p. 95)")
+    return index
 
 
 class ProgramRun:
@@ -85,13 +88,13 @@ class ProgramRun:
         """
         dialect = self._line.settings.dialect
         if record is not None:
-            check_record_number(record)
+            record = check_record_number(record)
         stops = self._motion.stops
         before = await self._look_before(dialect.start, goes_on=record is None)
         if record is not None:
             if before.idle_after_stop:
                 await self._line.command(dialect.break_off)  # START would continue what was stopped
-            await self._line.command(dialect.set_pointer.format(n=record))
+            await self._line.command(check_line(dialect.set_pointer.format(n=record)))
         await self._set_going(dialect.start, before, stops)
 
     async def run_record(self, record: int) -> None:
@@ -105,14 +108,14 @@ class ProgramRun:
             InvalidCommandError: There is no such record, or the dialect has no word for it; nothing was sent.
         """
         word = self._line.settings.dialect.single_record
-        check_record_number(record)
+        record = check_record_number(record)
         if word is None:
             raise InvalidCommandError(
                 "the word that runs a single record stands on no page that was available",
                 device=self._line.name,
                 hint="give it as Dialect(single_record=…) in the drive's settings, with {n} for the record",
             )
-        text, stops = word.format(n=record), self._motion.stops
+        text, stops = check_line(word.format(n=record)), self._motion.stops
         await self._set_going(text, await self._look_before(text, goes_on=False), stops)
 
     async def stop(self) -> None:

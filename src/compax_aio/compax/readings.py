@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from ..errors import InvalidCommandError
+from ..escaping import shown
 from ..link.contract import Lane
 from .codecs import (
     DriveStatus,
@@ -20,6 +21,7 @@ from .facts.device_errors import DeviceError
 from .facts.quantities import SELECTORS
 from .line import DriveLine
 from .observer import Observer
+from .plain_line import as_index
 
 __all__ = ["MAX_STATUS", "Readings"]
 
@@ -88,8 +90,10 @@ class Readings:
         Raises:
             InvalidCommandError: *number* is not a whole number from 1 to 250.
         """
-        if isinstance(number, bool) or not isinstance(number, int) or not 1 <= number <= MAX_STATUS:
-            raise InvalidCommandError(f"a status has a whole number from 1 to {MAX_STATUS}, not {number!r}")
+        index = as_index(number)
+        if index is None or not 1 <= index <= MAX_STATUS:
+            raise InvalidCommandError(f"a status has a whole number from 1 to {MAX_STATUS}, not {shown(number)}")
+        number = index
         status = await self._line.read(f"S{number}", lambda answer: decode_status_value(number, answer, self.unit))
         if number == _FAULT_STATUS:
             await self._observer.note(no_fault=str(status.value).startswith("1"))
@@ -105,7 +109,9 @@ class Readings:
             InvalidCommandError: *number* is not 13, 14 or 15.
         """
         if type(number) is not int or number not in SELECTORS:
-            raise InvalidCommandError(f"the quantity of a status can be chosen for S13, S14 and S15, not S{number!r}")
+            raise InvalidCommandError(
+                f"the quantity of a status can be chosen for S13, S14 and S15, not {shown(number)}"
+            )
         chosen = await self._line.query(f"P{SELECTORS[number]}")
         return await self._line.read(
             f"S{number}", lambda answer: decode_monitor_value(number, chosen, answer, self.unit)

@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Final
 
 from ..errors import InvalidCommandError
+from ..escaping import shown
+from .bounded_pattern import expect_bounded_pattern
 from .facts.limits import MAX_SPEED_PERCENT, POSITION_DECIMALS, POSITION_DECIMALS_INCH
 from .facts.line import ERROR_PATTERN
 from .facts.serial_interface import ERRORS_SUPPRESSED_BIT, XONXOFF_BIT
@@ -28,6 +30,10 @@ _PLACES: Final[Mapping[str, Mapping[str, object]]] = {
     "change_speed": {"percent": 100},
 }
 """What a word has places for, with an example of the longest."""
+_LONGEST_WORD: Final = 100
+"""Characters of a word with its places; what is sent has at most 30."""
+_WIDE_PLACE: Final = re.compile(r"\{[^}]*[0-9]{3}")
+"""A place may be made as wide as a number says: ``{n:999999999}``."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,6 +85,10 @@ class Dialect:
                 continue
             if not isinstance(word, str):
                 raise InvalidCommandError(f"the word for {each.name} is a text, not {word!r}")
+            if word != word.strip() or len(word) > _LONGEST_WORD or _WIDE_PLACE.search(word):
+                raise InvalidCommandError(
+                    f"the word for {each.name} is longer than what can be sent, or has blanks around it: {shown(word)}"
+                )
             try:
                 check_line(word.format(**places))
             except (AttributeError, LookupError, TypeError, ValueError) as error:
@@ -249,6 +259,8 @@ def _check_attempts(name: str, attempts: object) -> None:
 
 
 def _check_error_pattern(pattern: str) -> None:
+    if isinstance(pattern, str):
+        expect_bounded_pattern(pattern)
     try:
         groups = re.compile(pattern).groups
     except (re.error, TypeError) as error:

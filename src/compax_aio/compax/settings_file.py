@@ -14,9 +14,11 @@ from types import NoneType
 from typing import Any, Final, TypeVar
 
 from ..errors import InvalidCommandError
+from ..escaping import shown
+from ..text_file import name_of, replace_file
 from .facts.settings import DIALECT_FACTS, SETTING_FACTS, SettingFact
 from .settings import AxisUnit, Dialect, DriveSettings
-from .value_file import read_toml, replace_file
+from .value_file import read_toml
 
 __all__ = ["read_settings", "settings_text", "write_settings"]
 
@@ -53,13 +55,13 @@ def read_settings(path: str | Path) -> DriveSettings:
     try:
         return _table(DriveSettings, content, "")
     except InvalidCommandError as error:
-        raise InvalidCommandError(f"{path}: {error.what}", hint=error.hint) from error
+        raise InvalidCommandError(f"{name_of(Path(path))}: {error.what}", hint=error.hint) from error
 
 
 def _table(kind: type[_Table], content: object, where: str) -> _Table:
     """Read one table of the file, which stands at *where*."""
     if not isinstance(content, dict):
-        raise InvalidCommandError(f"{where} must be a table, not {content!r}")
+        raise InvalidCommandError(f"{where} must be a table, not {shown(content)}")
     hints = typing.get_type_hints(kind)
     for key in content:
         if key not in hints:
@@ -81,7 +83,7 @@ def _has_no_default(field: dataclasses.Field[Any]) -> bool:
 def _unknown(name: str, key: str, possible: Iterable[str]) -> InvalidCommandError:
     close = get_close_matches(key, possible, 1)
     guess = f"did you mean {close[0]}? " if close else ""
-    return InvalidCommandError(f"there is no setting {name!r}", hint=f"{guess}there are {', '.join(possible)}")
+    return InvalidCommandError(f"there is no setting {shown(name)}", hint=f"{guess}there are {', '.join(possible)}")
 
 
 def _value(hint: Any, value: object, name: str) -> Any:
@@ -93,7 +95,7 @@ def _value(hint: Any, value: object, name: str) -> Any:
         hint = options[0]  # nothing in the file stands for None
     if typing.get_origin(hint) is tuple:
         if not isinstance(value, list) or len(value) != 2:
-            raise InvalidCommandError(f"{name} must be two numbers as [-10, 500], not {value!r}")
+            raise InvalidCommandError(f"{name} must be two numbers as [-10, 500], not {shown(value)}")
         return tuple(_number(each, name) for each in value)
     if hint is Dialect:
         return _table(Dialect, value, name)
@@ -103,13 +105,13 @@ def _value(hint: Any, value: object, name: str) -> Any:
         return _number(value, name)
     if type(value) is not hint:
         wanted = {bool: "true or false", int: "a whole number", str: "a text in quotes"}[hint]
-        raise InvalidCommandError(f"{name} must be {wanted}, not {value!r}")
+        raise InvalidCommandError(f"{name} must be {wanted}, not {shown(value)}")
     return value
 
 
 def _number(value: object, name: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InvalidCommandError(f"{name} must be a number, not {value!r}")
+        raise InvalidCommandError(f"{name} must be a number, not {shown(value)}")
     try:
         return float(value)
     except OverflowError:
@@ -118,17 +120,17 @@ def _number(value: object, name: str) -> float:
 
 def _member(kind: type[Enum], value: object, name: str) -> Enum:
     if not isinstance(value, str) or value not in kind.__members__:
-        raise InvalidCommandError(f"{name} must be one of {', '.join(kind.__members__)}, not {value!r}")
+        raise InvalidCommandError(f"{name} must be one of {', '.join(kind.__members__)}, not {shown(value)}")
     return kind[value]
 
 
 def _units(value: object, name: str) -> dict[int, AxisUnit]:
     if not isinstance(value, dict):
-        raise InvalidCommandError(f"{name} must be tables as [{name}.1], not {value!r}")
+        raise InvalidCommandError(f"{name} must be tables as [{name}.1], not {shown(value)}")
     units = {}
     for key, unit in value.items():
         if not _is_whole(key):
-            raise InvalidCommandError(f"{name}.{key}: {key!r} is no value of P90, which are whole numbers")
+            raise InvalidCommandError(f"{name}.{key}: {shown(key)} is no value of P90, which are whole numbers")
         units[int(key)] = _table(AxisUnit, unit, f"{name}.{key}")
     return units
 
@@ -213,7 +215,7 @@ def _toml(value: object) -> str:
         try:
             text.encode()
         except UnicodeEncodeError:
-            raise InvalidCommandError(f"{value!r} cannot be written to a file: it is no text") from None
+            raise InvalidCommandError(f"{shown(value)} cannot be written to a file: it is no text") from None
         return text
     if isinstance(value, int):
         return str(value)

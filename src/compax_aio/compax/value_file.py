@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import re
-import secrets
 import tomllib
 from collections.abc import Mapping
 from contextlib import suppress
@@ -15,13 +13,18 @@ from pathlib import Path
 from typing import Any, Final
 
 from ..errors import InvalidCommandError
+from ..escaping import shown
+from ..text_file import name_of, read_text, replace_file
 
-__all__ = ["ValueFile", "read_file", "read_toml", "replace_file", "write_file"]
+__all__ = ["ValueFile", "read_file", "read_toml", "write_file"]
 
-_MAX_BYTES: Final = 256 * 1024
 _KEY: Final = re.compile(r"([PV])([0-9]{1,3})")
+_SHOWN: Final = 5
+"""Of the names in a file that is no such file, so many are told."""
 _MAX_DECIMALS: Final = 15
 """Enough for whatever a number in an answer has told."""
+_MAX_DOTS: Final = 100
+"""In a line: reading a key of ten thousand parts, ``a.a.a``, takes hours."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,35 +80,6 @@ def _plain(text: str) -> str:
     return "".join(each if each.isprintable() and each not in '"\\' else "?" for each in text)
 
 
-def replace_file(path: Path, text: str) -> None:
-    """
-    Write *text* to *path*; a file that is there is replaced at the end, or left as it is.
-
-    It keeps its permissions, and a link stays one: the file that it leads to is replaced.
-
-    Raises:
-        OSError: The file cannot be written.
-    """
-    path = Path(os.path.realpath(path))
-    new = path.parent / f".{path.name[:32]}.{secrets.token_hex(4)}"
-    with new.open("x", encoding="utf-8") as file:
-        try:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-            with suppress(OSError):  # there is none, or it is another's
-                new.chmod(path.stat().st_mode)
-        except BaseException:
-            new.unlink()
-            raise
-    try:
-        new.replace(path)
-    except BaseException:
-        with suppress(OSError):
-            new.unlink()
-        raise
-
-
 def read_toml(path: Path, kind: str) -> dict[str, Any]:
     """
     Read a file of *kind*, which names it in errors, as TOML.
@@ -114,15 +88,16 @@ def read_toml(path: Path, kind: str) -> dict[str, Any]:
         InvalidCommandError: It is too large, or no TOML.
         OSError: It cannot be read.
     """
-    with path.open("rb") as file:
-        data = file.read(_MAX_BYTES + 1)
-    if len(data) > _MAX_BYTES:
-        raise InvalidCommandError(f"{path} is larger than any file of {kind}: more than {_MAX_BYTES} bytes")
+    text = read_text(path, f"TOML file of {kind}")
+    if any(line.count(".") > _MAX_DOTS for line in text.split("\n")):
+        raise InvalidCommandError(
+            f"{name_of(path)} is no TOML that is read here: a line has more than {_MAX_DOTS} dots"
+        )
     try:
-        content = tomllib.loads(data.decode("utf-8-sig"))
+        content = tomllib.loads(text)
         repr(content)  # as whoever tells what is wrong with it will want to
-    except (ValueError, RecursionError) as error:  # no TOML, no text, or a number of thousands of digits
-        raise InvalidCommandError(f"{path} is no TOML: {error}") from error
+    except (ValueError, RecursionError) as error:  # no TOML, or a number of thousands of digits
+        raise InvalidCommandError(f"{name_of(path)} is no TOML: {error}") from error
     return content
 
 
@@ -137,17 +112,18 @@ def read_file(path: Path, *, kind: str, letter: str) -> ValueFile:
     content = read_toml(path, kind)
     if content.get("kind") != kind or set(content) - {"kind", "drive", "saved_at", kind}:
         raise InvalidCommandError(
-            f'{path} is no file of {kind}: it must say kind = "{kind}" and hold a table [{kind}], and nothing else',
-            hint=f"it holds {', '.join(sorted(content)) or 'nothing'}",
+            f"{name_of(path)} is no file of {kind}: "
+            f'it must say kind = "{kind}" and hold a table [{kind}], and nothing else',
+            hint=f"it holds {', '.join(map(shown, sorted(content)[:_SHOWN])) or 'nothing'}",
         )
     table = content.get(kind)
     if not isinstance(table, dict):
-        raise InvalidCommandError(f"{path} has no table [{kind}]")
+        raise InvalidCommandError(f"{name_of(path)} has no table [{kind}]")
     values: dict[int, float] = {}
     for key, value in table.items():
         found = _KEY.fullmatch(key)
         if found is None or found[1] != letter or int(found[2]) in values:
-            raise InvalidCommandError(f"{path}: {key!r} is not one of {letter}1, {letter}2, …, each once")
+            raise InvalidCommandError(f"{name_of(path)}: {shown(key)} is not one of {letter}1, {letter}2, …, each once")
         values[int(found[2])] = _number(path, key, value)
     return ValueFile(
         kind=kind, drive=str(content.get("drive", "")), saved_at=str(content.get("saved_at", "")), values=values
@@ -159,4 +135,4 @@ def _number(path: Path, key: str, value: object) -> float:
         with suppress(OverflowError):
             if isfinite(value):
                 return float(value)
-    raise InvalidCommandError(f"{path}: {key} = {value!r:.60} is no number that a drive has")
+    raise InvalidCommandError(f"{name_of(path)}: {key} = {shown(value)} is no number that a drive has")

@@ -10,6 +10,7 @@ from numbers import Real
 from typing import TypedDict, TypeVar
 
 from ..errors import InvalidCommandError
+from ..escaping import shown
 from .facts.limits import (
     MAX_ACCELERATION_TIME_MS,
     MAX_POSITION,
@@ -18,7 +19,7 @@ from .facts.limits import (
     SPEED_DECIMALS,
 )
 from .facts.program_commands import MAX_LEVELS
-from .plain_line import check_line
+from .plain_line import as_index, check_line
 from .settings import DriveSettings
 
 __all__ = [
@@ -97,6 +98,12 @@ class MovePlan:
     """Whether ``$`` applies: to POSA and POSR only (UG p. 160)."""
     finds_machine_zero: bool = False
 
+    def __post_init__(self) -> None:
+        """Refuse what cannot be sent, whoever has made the plan."""
+        for each in ("settings_lines", "point_lines"):
+            object.__setattr__(self, each, tuple(check_line(line) for line in getattr(self, each)))
+        object.__setattr__(self, "motion", check_line(self.motion, room_for_sign=self.may_ask_for_message))
+
 
 def plan_move_to(
     position: float,
@@ -122,7 +129,7 @@ def plan_move_to(
         sets_speed=speed_percent is not None,
         point_lines=_point_lines(settings, steps, points := tuple(_all("comparators", comparators))),
         comparators=len(points),
-        motion=check_line(f"PA{_written(target, settings.decimals)}", room_for_sign=True),
+        motion=f"PA{_written(target, settings.decimals)}",
     )
 
 
@@ -145,7 +152,8 @@ def plan_move_by(
     rounded = _position("distance", distance, settings)
     if rounded == 0 != distance:
         raise InvalidCommandError(
-            f"distance {distance!r} is nothing once rounded to the drive's {settings.decimals} decimals (UG p. 100)"
+            f"distance {shown(distance)} is nothing once rounded to the drive's {settings.decimals} decimals "
+            "(UG p. 100)"
         )
     return MovePlan(
         description=f"move_by({_written(rounded, settings.decimals)})",
@@ -154,7 +162,7 @@ def plan_move_by(
         sets_speed=speed_percent is not None,
         point_lines=_point_lines(settings, steps, points := tuple(_all("comparators", comparators))),
         comparators=len(points),
-        motion=check_line(f"PR{_written(rounded, settings.decimals)}", room_for_sign=True),
+        motion=f"PR{_written(rounded, settings.decimals)}",
     )
 
 
@@ -162,7 +170,7 @@ def plan_home(settings: DriveSettings) -> MovePlan:
     """Plan the search for machine zero (POSA HOME, UG p. 162); whether it takes ``$`` is not documented."""
     return MovePlan(
         description="home()",
-        motion=check_line(settings.dialect.home),
+        motion=settings.dialect.home,
         may_ask_for_message=False,
         finds_machine_zero=True,
     )
@@ -203,15 +211,20 @@ def setting_of_outputs(first: int, levels: Sequence[bool | int]) -> str:
     Raises:
         InvalidCommandError: There is no such output, or it is not told 0 or 1.
     """
-    whole = isinstance(first, int) and not isinstance(first, bool)
-    if not whole or not 1 <= len(levels) <= MAX_LEVELS or {first, first + len(levels) - 1} - set(OUTPUT_NUMBERS):
+    index, count = as_index(first), len(levels)
+    if index is None or not 1 <= count <= MAX_LEVELS or {index, index + count - 1} - set(OUTPUT_NUMBERS):
         raise InvalidCommandError(
             f"1 to {MAX_LEVELS} of the outputs 1 to {OUTPUT_NUMBERS[-1]} are set at once, "
-            f"not {len(levels)} from output {first!r} on"
+            f"not {count} from output {shown(first)} on"
         )
-    if any(level not in (0, 1) for level in levels):
-        raise InvalidCommandError(f"an output is set to 0 or 1, not to {tuple(levels)!r}")
-    return check_line(f"OT O{first}={''.join(str(int(level)) for level in levels)}")
+    return check_line(f"OT O{index}={''.join(map(_level, levels))}")
+
+
+def _level(level: bool | int) -> str:
+    number = level if isinstance(level, bool) else check_number("the level of an output", level)
+    if number not in (0, 1):
+        raise InvalidCommandError(f"an output is set to 0 or 1, not to {shown(level)}")
+    return "1" if number else "0"
 
 
 def _settings_lines(
@@ -222,14 +235,15 @@ def _settings_lines(
         speed = check_number("speed_percent", speed_percent)
         if not 0 < speed <= settings.speed_limit_percent or round(speed, SPEED_DECIMALS) == 0:
             raise InvalidCommandError(
-                f"speed_percent must be above 0 and at most {settings.speed_limit_percent:g}, not {speed_percent!r}",
+                f"speed_percent must be above 0 and at most {settings.speed_limit_percent:g}, "
+                f"not {shown(speed_percent)}",
                 hint="DriveSettings.speed_limit_percent allows more, up to 600",
             )
-        lines.append(check_line(f"SD{_written(speed, SPEED_DECIMALS)}"))
+        lines.append(f"SD{_written(speed, SPEED_DECIMALS)}")
     if acceleration_ms is not None:
-        lines.append(check_line(f"AL{_ramp_time('acceleration_ms', acceleration_ms)}"))
+        lines.append(f"AL{_ramp_time('acceleration_ms', acceleration_ms)}")
     if deceleration_ms is not None:
-        lines.append(check_line(f"AL-{_ramp_time('deceleration_ms', deceleration_ms)}"))
+        lines.append(f"AL-{_ramp_time('deceleration_ms', deceleration_ms)}")
     return tuple(lines)
 
 
@@ -245,19 +259,19 @@ def _point_lines(
         lines.append(f"PR{_point_distance(step.distance, settings)} SD{speed}")
     for item in comparators:
         comparator = item if isinstance(item, Comparator) else _of_tuple(Comparator, item)
-        if comparator.output not in OUTPUT_NUMBERS or comparator.value not in (0, 1):
+        output = check_number("the output of a comparator", comparator.output)
+        if output not in OUTPUT_NUMBERS:
             raise InvalidCommandError(
-                f"a comparator sets one of the outputs 1 to {OUTPUT_NUMBERS[-1]} to 0 or 1, "
-                f"not output {comparator.output!r} to {comparator.value!r}"
+                f"a comparator sets one of the outputs 1 to {OUTPUT_NUMBERS[-1]}, not output {shown(comparator.output)}"
             )
         distance = _point_distance(comparator.distance, settings)
-        lines.append(f"PR{distance} OT O{int(comparator.output)}={int(comparator.value)}")
+        lines.append(f"PR{distance} OT O{int(output)}={_level(comparator.value)}")
     if len(lines) > MAX_PREPARED_POINTS:
         raise InvalidCommandError(
             f"a move takes at most {MAX_PREPARED_POINTS} speed steps and comparators together (UG p. 101), "
             f"not {len(lines)}"
         )
-    return tuple(check_line(line) for line in lines)
+    return tuple(lines)
 
 
 def _whole_speed(what: str, value: float, settings: DriveSettings) -> int:
@@ -265,7 +279,7 @@ def _whole_speed(what: str, value: float, settings: DriveSettings) -> int:
     speed = check_number(what, value)
     if speed != int(speed) or not 0 < speed <= settings.speed_limit_percent:
         raise InvalidCommandError(
-            f"{what} is a whole number from 1 to {settings.speed_limit_percent:g} (UG p. 101), not {value!r}"
+            f"{what} is a whole number from 1 to {settings.speed_limit_percent:g} (UG p. 101), not {shown(value)}"
         )
     return int(speed)
 
@@ -274,14 +288,14 @@ def _all(what: str, points: Iterable[_Point]) -> Iterable[_Point]:
     try:
         return iter(points)
     except TypeError:
-        raise InvalidCommandError(f"{what} are several, as a list or tuple, not {points!r}") from None
+        raise InvalidCommandError(f"{what} are several, as a list or tuple, not {shown(points)}") from None
 
 
 def _of_tuple(kind: type[_Point], values: object) -> _Point:
     try:
         return kind(*values)  # type: ignore[misc]
     except TypeError:
-        raise InvalidCommandError(f"{values!r} is no {kind.__name__}") from None
+        raise InvalidCommandError(f"{shown(values)} is no {kind.__name__}") from None
 
 
 def _point_distance(distance: float, settings: DriveSettings) -> str:
@@ -289,7 +303,7 @@ def _point_distance(distance: float, settings: DriveSettings) -> str:
     if rounded <= 0:
         raise InvalidCommandError(
             f"the distance of a speed step or comparator counts from the start of the move and is positive "
-            f"(UG p. 101), not {distance!r}"
+            f"(UG p. 101), not {shown(distance)}"
         )
     return _written(rounded, settings.decimals)
 
@@ -297,7 +311,7 @@ def _point_distance(distance: float, settings: DriveSettings) -> str:
 def _position(what: str, value: float, settings: DriveSettings) -> float:
     number = round(check_number(what, value), settings.decimals)
     if abs(number) > MAX_POSITION:
-        raise InvalidCommandError(f"{what} must be within ±{MAX_POSITION:,.0f} {settings.unit}, not {value!r}")
+        raise InvalidCommandError(f"{what} must be within ±{MAX_POSITION:,.0f} {settings.unit}, not {shown(value)}")
     return number + 0.0  # no -0.0
 
 
@@ -306,7 +320,7 @@ def _ramp_time(what: str, value: int) -> int:
     if number != int(number) or not 0 <= number <= MAX_ACCELERATION_TIME_MS:
         raise InvalidCommandError(
             f"{what} must be a whole number of milliseconds from 0 to {MAX_ACCELERATION_TIME_MS} (IBS p. 48), "
-            f"not {value!r}"
+            f"not {shown(value)}"
         )
     return int(number)
 
@@ -319,13 +333,13 @@ def check_number(what: str, value: object) -> float:
         InvalidCommandError: It is no number, or not finite; *what* names it.
     """
     if isinstance(value, bool) or not (isinstance(value, Real | Decimal)):
-        raise InvalidCommandError(f"{what} must be a number, not {value!r}")
+        raise InvalidCommandError(f"{what} must be a number, not {shown(value)}")
     try:
         number = float(value)
     except (OverflowError, ValueError):
-        raise InvalidCommandError(f"{what} must be finite and in range, not {value!r:.60}") from None
+        raise InvalidCommandError(f"{what} must be finite and in range, not {shown(value)}") from None
     if not isfinite(number):
-        raise InvalidCommandError(f"{what} must be finite, not {value!r}")
+        raise InvalidCommandError(f"{what} must be finite, not {shown(value)}")
     return number
 
 

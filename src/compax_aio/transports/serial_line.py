@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import asyncio
+import fcntl
 import os
+import sys
 import termios
 import threading
 from collections.abc import Iterable
 from contextlib import suppress
 from typing import Any
 
-import serial
 import serial_asyncio
 
 from compax_aio.errors import ConnectionLostError
 
-__all__ = ["SerialLine"]
+from .serial_backends import Port
+
+__all__ = ["SerialLine", "unsent_bytes"]
 
 _READ_BYTES = 64 * 1024
 
@@ -38,12 +41,13 @@ class SerialLine(serial_asyncio.SerialTransport):  # type: ignore[misc]  # it ha
     :meth:`abort` and a second after :meth:`close`.
     """
 
-    def __init__(self, loop: asyncio.AbstractEventLoop, protocol: asyncio.Protocol, port: serial.Serial) -> None:
+    def __init__(self, loop: asyncio.AbstractEventLoop, protocol: asyncio.Protocol, port: Port, name: str) -> None:
         # Not the base's __init__: it sets the port up again, on the loop, and schedules connection_made for later.
         asyncio.Transport.__init__(self, {"serial": port})
         self._loop = loop
         self._protocol = protocol
         self._serial = port
+        self._name = name
         self._fd: int = port.fileno()
         self._closing = False
         self._releasing = False
@@ -67,10 +71,10 @@ class SerialLine(serial_asyncio.SerialTransport):  # type: ignore[misc]  # it ha
 
     def __repr__(self) -> str:
         state = "closed" if self._lost else "closing" if self._closing else "open"
-        return f"<SerialLine {self._serial.port} {state}>"
+        return f"<SerialLine {self._name} {state}>"
 
     def get_extra_info(self, name: str, default: Any = None) -> Any:
-        """Return the :class:`serial.Serial` for the name ``serial``."""
+        """Return what the port was opened by (``serial.Serial`` or ``serialx.Serial``) for the name ``serial``."""
         return self._extra.get(name, default)
 
     def set_protocol(self, protocol: asyncio.BaseProtocol) -> None:
@@ -181,7 +185,7 @@ class SerialLine(serial_asyncio.SerialTransport):  # type: ignore[misc]  # it ha
 
     def _went_away(self, cause: OSError | None) -> None:
         lost = ConnectionLostError(
-            f"the serial port {self._serial.port} went away" + (f": {cause.strerror}" if cause else ""),
+            f"the serial port {self._name} went away" + (f": {cause.strerror}" if cause else ""),
             hint="was its adapter unplugged?",
         )
         lost.__cause__ = cause
@@ -189,7 +193,7 @@ class SerialLine(serial_asyncio.SerialTransport):  # type: ignore[misc]  # it ha
 
     def _release_when_sent(self, deadline: float) -> None:
         try:
-            unsent = len(self._write_buffer) or self._serial.out_waiting
+            unsent = len(self._write_buffer) or unsent_bytes(self._fd)
         except OSError as exc:
             self._went_away(exc)
             return
@@ -223,7 +227,12 @@ class SerialLine(serial_asyncio.SerialTransport):  # type: ignore[misc]  # it ha
             self._protocol.connection_lost(exc)
 
 
-def _release_port(port: serial.Serial, discard: bool) -> None:
+def unsent_bytes(descriptor: int) -> int:
+    """Return how many bytes the driver has not sent yet; OSError if the port went away."""
+    return int.from_bytes(fcntl.ioctl(descriptor, termios.TIOCOUTQ, bytes(4)), sys.byteorder)
+
+
+def _release_port(port: Port, discard: bool) -> None:
     # Closing waits until the driver has sent everything, which is never while the far end holds the line.
     if discard:
         with suppress(termios.error):

@@ -30,10 +30,18 @@ async def open_unix(url: TransportURL, protocol_factory: ProtocolFactory) -> asy
         raise TransportError(f"the URL {str(url)!r} has no path", hint=f"write it as {_FORM}, with three slashes")
     if not hasattr(socket, "AF_UNIX"):
         raise TransportError("this platform has no Unix sockets", hint="use tcp:// instead")
+    sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
-        transport, _ = await asyncio.get_running_loop().create_unix_connection(protocol_factory, url.path)
-    except OSError as exc:
-        raise await asyncio.to_thread(_explained, url.path, exc) from exc
+        sock.setblocking(False)
+        try:
+            # Not loop.sock_connect: a listener whose queue is full says EAGAIN, which that takes for a connection.
+            sock.connect(url.path)
+        except OSError as exc:
+            raise await asyncio.to_thread(_explained, url.path, exc) from exc
+        transport, _ = await asyncio.get_running_loop().create_unix_connection(protocol_factory, sock=sock)
+    except BaseException:
+        sock.close()
+        raise
     return transport
 
 
@@ -50,5 +58,10 @@ def _explained(path: str, exc: OSError) -> TransportError:
     if isinstance(exc, ConnectionRefusedError):
         return TransportError(
             f"nothing listens on the socket {path}", hint="the program that made it has ended; start it again"
+        )
+    if isinstance(exc, BlockingIOError):
+        return TransportError(
+            f"the program that listens on the socket {path} takes no more connections",
+            hint="does it hang, or does it serve one at a time?",
         )
     return TransportError(f"the socket {path} could not be connected to: {exc}")

@@ -21,8 +21,10 @@ _SHAPE = re.compile(
     r"(?P<authority>[^/?#@]*)(?P<path>[^?#]*)(?:\?(?P<query>[^#]*))?"
 )
 _AUTHORITY = re.compile(r"(?P<host>\[[^\[\]]*\]|[^:\[\]]*)(?::(?P<port>.*))?")
-_PASSWORD = re.compile(r"(?<=://)([^/?#:]*):[^/?#]*@")
-_ANYTHING_LIKE_A_PASSWORD = re.compile(r":(?!//).*@", re.DOTALL)
+# A password with a / in it makes part of itself the path: all from the first colon to the last @ is hidden.
+_PASSWORD = re.compile(r"(?<=://)([^?#:]*):[^?#]*@")
+_SECRET_OPTION = re.compile(r"pass(word|wd|phrase)|secret|token|credential", re.IGNORECASE)
+_ANYTHING_LIKE_A_PASSWORD = re.compile(r"():(?!//).*@", re.DOTALL)
 _HALF_ESCAPE = re.compile(r"%(?![0-9A-Fa-f]{2})")
 _CONTROL = re.compile(r"[\x00-\x1f\x7f]")
 _FLAGS: Mapping[str, bool] = {"1": True, "0": False}
@@ -41,7 +43,8 @@ class TransportURL:
         port: Port number 1..65535, or None.
         path: Path with its leading ``/``, or empty.
         query: The options as text, each key once.
-        text: The URL as it was written, password included; ``str()`` and ``repr()`` hide the password.
+        text: The URL as it was written, secrets included. ``str()`` and ``repr()`` hide a password before the host,
+            and the value of every option whose name speaks of a password, secret, token or credential.
     """
 
     scheme: str
@@ -69,7 +72,7 @@ class TransportURL:
         authority = _AUTHORITY.fullmatch(shape["authority"])
         if authority is None:
             raise _unusable(
-                text, f"its host {shape['authority']!r} is ambiguous", "write an IPv6 address in brackets: [::1]:4001"
+                text, "its host {} is ambiguous", "write an IPv6 address in brackets: [::1]:4001", shape["authority"]
             )
         return cls(
             scheme=shape["scheme"].lower(),
@@ -81,7 +84,7 @@ class TransportURL:
         )
 
     def __str__(self) -> str:
-        return _PASSWORD.sub(r"\1:***@", self.text, count=1)
+        return _shown(_PASSWORD, self.text)
 
     def __repr__(self) -> str:
         return f"TransportURL({str(self)!r})"
@@ -106,19 +109,22 @@ class TransportURL:
             query: The options that are known.
 
         Raises:
-            TransportError: The URL has a part that would be ignored.
+            TransportError: The URL has a part that would be ignored; a user's name and password always are.
         """
+        shape = _SHAPE.fullmatch(self.text)
+        if shape is not None and shape["userinfo"] is not None:
+            raise _unusable(self.text, f"{self.scheme}:// takes no user name or password", f"write it as {form}")
         for name, allowed, value in (
             ("host", host, self.host),
             ("port number", port, self.port),
             ("path", path, self.path),
         ):
             if value and not allowed:
-                raise _unusable(self.text, f"{self.scheme}:// takes no {name}, got {value!r}", f"write it as {form}")
+                raise _unusable(self.text, f"{self.scheme}:// takes no {name}, got {{}}", f"write it as {form}", value)
         for key in self.query:
             if key not in query:
                 known = ", ".join(sorted(query)) or "none"
-                raise _unusable(self.text, f"{self.scheme}:// has no option {key!r}", f"known options: {known}")
+                raise _unusable(self.text, f"{self.scheme}:// has no option {{}}", f"known options: {known}", key)
 
     def integer(self, key: str, default: int, *, minimum: int, maximum: int) -> int:
         """Return the option *key* as a whole number from *minimum* to *maximum*."""
@@ -166,14 +172,15 @@ class TransportURL:
         else:
             if accept(value):
                 return value
-        raise _unusable(self.text, f"{key}={text!r} is not allowed", f"{key} is {allowed}")
+        shown = "***" if _SECRET_OPTION.search(key) else text
+        raise _unusable(self.text, f"{key}={{}} is not allowed", f"{key} is {allowed}", shown)
 
 
 def _port(url: str, text: str | None) -> int | None:
     if text is None:
         return None
     if not (text.isascii() and text.isdecimal() and 1 <= int(text[:6]) <= 65535):
-        raise _unusable(url, f"its port number is {text!r}", "a port number is a whole number from 1 to 65535")
+        raise _unusable(url, "its port number is {}", "a port number is a whole number from 1 to 65535", text)
     return int(text)
 
 
@@ -182,27 +189,39 @@ def _query(url: str, text: str) -> dict[str, str]:
     for item in text.split("&") if text else ():
         key, equals, value = item.partition("=")
         if not (key and equals):
-            raise _unusable(url, f"its option {item!r} has no value", "write options as key=value, with & between them")
+            raise _unusable(url, "its option {} has no value", "write options as key=value, with & between them", item)
         key = _decoded(url, key)
         if key in query:
-            raise _unusable(url, f"its option {key!r} is given twice", "give each option once")
+            raise _unusable(url, "its option {} is given twice", "give each option once", key)
         query[key] = _decoded(url, value)
     return query
 
 
 def _decoded(url: str, text: str) -> str:
     if _HALF_ESCAPE.search(text):
-        raise _unusable(url, f"{text!r} has a % that begins no escape", "write a % itself as %25")
+        raise _unusable(url, "{} has a % that begins no escape", "write a % itself as %25", text)
     try:
         decoded = unquote(text, errors="strict")
     except UnicodeDecodeError as exc:
-        raise _unusable(url, f"{text!r} is not UTF-8 once it is decoded", "escape the bytes of UTF-8") from exc
+        raise _unusable(url, "{} is not UTF-8 once it is decoded", "escape the bytes of UTF-8", text) from exc
     if _CONTROL.search(decoded):
-        raise _unusable(url, f"{decoded!r} contains a control character", "take it out")
+        raise _unusable(url, "{} contains a control character", "take it out", decoded)
     return decoded
 
 
-def _unusable(url: str, what: str, hint: str) -> TransportError:
-    # A malformed URL does not say where its password ends.
-    shown = _ANYTHING_LIKE_A_PASSWORD.sub(":***@", url)
-    return TransportError(f"cannot use the URL {shown!r}: {what}", hint=hint)
+def _shown(password: re.Pattern[str], url: str) -> str:
+    """Return *url* as it may be shown and logged."""
+    before, mark, query = password.sub(r"\1:***@", url, count=1).partition("?")
+    return before + mark + "&".join(map(_shown_option, query.split("&")))
+
+
+def _shown_option(item: str) -> str:
+    key, equals, _ = item.partition("=")
+    return f"{key}{equals}***" if equals and _SECRET_OPTION.search(unquote(key)) else item
+
+
+def _unusable(url: str, what: str, hint: str, part: object = "") -> TransportError:
+    """Return the error that says *what* is wrong, with *part* in place of its ``{}``."""
+    # A malformed URL does not say where its password ends, and any part of it may be part of that.
+    said = what.replace("{}", "***" if _ANYTHING_LIKE_A_PASSWORD.search(url) else repr(part), 1)
+    return TransportError(f"cannot use the URL {_shown(_ANYTHING_LIKE_A_PASSWORD, url)!r}: {said}", hint=hint)

@@ -8,6 +8,7 @@ from decimal import Decimal
 from typing import Final
 
 from ...errors import InvalidCommandError
+from ...escaping import shown
 from ..facts.line import MAX_LINE_LENGTH
 from ..facts.program_commands import ARITHMETIC_SIGNS, COMPARISON_SIGNS, NUMBERS, RECORD_TEMPLATE
 from .forms import FORMS_OF, Form
@@ -91,7 +92,7 @@ def _line(template: str, number: int, text: str) -> str:
         return template.format(n=number, text=text)
     except (AttributeError, LookupError, TypeError, ValueError) as error:
         raise InvalidCommandError(
-            f"record number {number!r} cannot be written by the template {template!r}: {error}",
+            f"record number {shown(number)} cannot be written by the template {shown(template)}: {error}",
             hint=f"a template has {{n}} and {{text}}, like {RECORD_TEMPLATE!r}",
         ) from None
 
@@ -99,11 +100,11 @@ def _line(template: str, number: int, text: str) -> str:
 def _form(record: Record) -> tuple[Form, list[object]]:
     by_count = FORMS_OF.get(type(record))
     if by_count is None:
-        raise InvalidCommandError(f"{record!r} is no record of a program")
+        raise InvalidCommandError(f"{shown(record)} is no record of a program")
     values = [value for field in fields(record) if (value := getattr(record, field.name)) is not None]
     form = by_count.get(len(values))
     if form is None:
-        raise InvalidCommandError(f"{record!r} cannot be written: a field is missing")
+        raise InvalidCommandError(f"{shown(record)} cannot be written: a field is missing")
     return form, values
 
 
@@ -120,22 +121,29 @@ def _written(value: object, place: str) -> str:
         return "".join(_written(each, "level") for each in value)
     if isinstance(value, Parameter | Variable | Status):
         # A dot says "in place of a number" (UG p. 100); where P, V and S stand for themselves there is none. Inferred.
-        return ("." if place in NUMBERS else "") + _LETTERS[type(value)] + str(value.number)
+        return ("." if place in NUMBERS else "") + _LETTERS[type(value)] + _whole(value.number)
     if isinstance(value, Decimal):
         return _number(value)
     if isinstance(value, int):
-        return str(int(value))
+        return _whole(value)
     if isinstance(value, str) and value in (*COMPARISON_SIGNS, *ARITHMETIC_SIGNS):
         return value
     raise InvalidCommandError(
-        f"{value!r} cannot be written into a record", hint="numbers are int or Decimal: Decimal('0.1'), not 0.1"
+        f"{shown(value)} cannot be written into a record", hint="numbers are int or Decimal: Decimal('0.1'), not 0.1"
     )
+
+
+def _whole(number: int) -> str:
+    plain = int.__int__(number) if isinstance(number, int) else None  # which writes itself as a number
+    if plain is None or abs(plain) >= 10**_LONGEST_NUMBER:
+        raise InvalidCommandError(f"{shown(number)} is no whole number that could be written into a record")
+    return str(plain)
 
 
 def _number(number: Decimal) -> str:
     """Write *number* exactly, as short as it goes."""
     if not number.is_finite():
-        raise InvalidCommandError(f"{number} is no number that a drive could be told")
+        raise InvalidCommandError(f"{shown(number)} is no number that a drive could be told")
     exponent = number.as_tuple().exponent
     if number.adjusted() > _LONGEST_NUMBER or (isinstance(exponent, int) and abs(exponent) > _LONGEST_NUMBER):
         raise InvalidCommandError(f"a number of more than {_LONGEST_NUMBER} digits cannot be written")

@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 import os
 import re
-import tempfile
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, NoReturn, TypeVar
+
+from compax_aio.escaping import shown
+from compax_aio.text_file import name_of, read_text, replace_file
 
 from .faults import STAGES
 from .parameters import stored
@@ -26,8 +27,9 @@ _KEYS: Final = frozenset({
     "kind", "version", "parameters", "variables", "program", "error_history", "error_present", "axis", "cycles",
     "operating_time_s",
 })  # fmt: skip
-_MAX_BYTES: Final = 256 * 1024
 _LARGEST: Final = 1e12
+_LONGEST_RECORD: Final = 100
+"""Characters; none that a drive takes has more than 30, and in long form twice as many."""
 _NAME: Final = re.compile("([NPV])(0|[1-9][0-9]{0,2})")
 _T = TypeVar("_T")
 
@@ -104,19 +106,7 @@ def write_state_file(path: str | os.PathLike[str], state: Mapping[str, Any]) -> 
     Raises:
         OSError: The file cannot be written.
     """
-    path = Path(path)
-    text = json.dumps(state, indent=2, allow_nan=False) + "\n"
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        Path(name).replace(path)
-    except BaseException:
-        with suppress(OSError):
-            Path(name).unlink()
-        raise
+    replace_file(Path(path), json.dumps(state, indent=2, allow_nan=False) + "\n")
 
 
 def read_state_file(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -127,15 +117,13 @@ def read_state_file(path: str | os.PathLike[str]) -> dict[str, Any]:
         ValueError: It is no such file, or holds something that no drive can keep; says what and where.
         OSError: It cannot be read.
     """
-    with Path(path).open("rb") as file:
-        data = file.read(_MAX_BYTES + 1)
+    path = Path(path)
     try:
-        if len(data) > _MAX_BYTES:
-            _refuse(f"more than {_MAX_BYTES} bytes")
-        state = json.loads(data.decode("utf-8"), object_pairs_hook=_object, parse_constant=_no_number)
+        text = read_text(path, "state")
+        state = json.loads(text, object_pairs_hook=_object, parse_constant=_no_number)
         read_state(state)
     except (ValueError, RecursionError) as error:
-        raise ValueError(f"{path} is no state of a simulated drive: {error}") from error
+        raise ValueError(f"{name_of(path)} is no state of a simulated drive: {error}") from error
     assert isinstance(state, dict)
     return state
 
@@ -146,10 +134,11 @@ def _refuse(why: str) -> NoReturn:
 
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """Make a table of *pairs*; of two values for one name nobody knows which is meant."""
-    table = dict(pairs)
-    if len(table) < len(pairs):
-        names = [name for name, _ in pairs]
-        _refuse(f"{next(name for name in names if names.count(name) > 1)!r} stands there twice")
+    table: dict[str, Any] = {}
+    for name, value in pairs:
+        if name in table:
+            _refuse(f"{shown(name)} stands there twice")
+        table[name] = value
     return table
 
 
@@ -161,7 +150,7 @@ def _expect_keys(table: Mapping[str, Any], where: str, names: frozenset[str]) ->
     if missing := names - set(table):
         _refuse(f"{where}{min(missing)} is missing")
     if unknown := set(table) - names:
-        _refuse(f"{where}{min(map(str, unknown))!r} means nothing")
+        _refuse(f"{where}{shown(min(map(str, unknown)))} means nothing")
 
 
 def _table(state: Mapping[str, Any], name: str) -> Mapping[str, Any]:
@@ -173,21 +162,21 @@ def _table(state: Mapping[str, Any], name: str) -> Mapping[str, Any]:
 
 def _flag(table: Mapping[str, Any], name: str) -> bool:
     if not isinstance(table[name], bool):
-        _refuse(f"{name} = {table[name]!r} is neither true nor false")
+        _refuse(f"{name} = {shown(table[name])} is neither true nor false")
     return bool(table[name])
 
 
 def _number(table: Mapping[str, Any], name: str, low: float = -_LARGEST) -> float:
     value = table[name]
     if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= _LARGEST:
-        _refuse(f"{name} = {value!r} is no such number")
+        _refuse(f"{name} = {shown(value)} is no such number")
     return float(value)
 
 
 def _count(table: Mapping[str, Any], name: str) -> int:
     value = _number(table, name, low=0)
     if value != int(value):
-        _refuse(f"{name} = {value!r} is no count")
+        _refuse(f"{name} = {shown(value)} is no count")
     return int(value)
 
 
@@ -195,7 +184,7 @@ def _history(codes: Any) -> tuple[int, ...]:
     if not isinstance(codes, list | tuple) or len(codes) != STAGES:
         _refuse(f"error_history has {STAGES} codes")
     if any(isinstance(code, bool) or not isinstance(code, int) or not 0 <= code <= 99 for code in codes):
-        _refuse(f"error_history = {list(codes)!r} holds something else than codes from 0 to 99")
+        _refuse(f"error_history = {shown(list(codes))} holds something else than codes from 0 to 99")
     return tuple(codes)
 
 
@@ -206,11 +195,11 @@ def _numbered(
     for key, value in _table(state, name).items():
         found = _NAME.fullmatch(key) if isinstance(key, str) else None
         if found is None or found[1] != letter:
-            _refuse(f"{name}: {key!r} is not one of {letter}1, {letter}2, ...")
+            _refuse(f"{name}: {shown(key)} is not one of {letter}1, {letter}2, ...")
         try:
             values[int(found[2])] = read(letter, int(found[2]), value)
         except RefusedError as refused:
-            raise ValueError(f"{name}: {key} = {value!r} is refused: {refused}") from None
+            raise ValueError(f"{name}: {key} = {shown(value)} is refused: {refused}") from None
     return values
 
 
@@ -218,11 +207,13 @@ def _stored(letter: str, number: int, value: Any) -> float:
     name = f"{letter}{number}"
     exact = _number({name: value}, name)
     if stored(letter, number, exact) != exact:
-        _refuse(f"{name} = {value!r} is finer than it can be stored")
+        _refuse(f"{name} = {shown(value)} is finer than it can be stored")
     return exact + 0.0
 
 
 def _record(_: str, number: int, text: Any) -> str:
     if not isinstance(text, str):
-        _refuse(f"N{number} = {text!r} is no text")
+        _refuse(f"N{number} = {shown(text)} is no text")
+    if len(text) > _LONGEST_RECORD:
+        _refuse(f"N{number} has {len(text)} characters and is no record")
     return check_record(number, text)

@@ -1,0 +1,1 @@
+"""Measurements against other libraries; each module says how it is run."""
