@@ -601,6 +601,9 @@ async def test_a_transport_that_is_no_subclass_of_asyncios_serves_as_well() -> N
         def write(self, data: bytes) -> None:
             self.written = data
 
+        def get_write_buffer_size(self) -> int:
+            return 0
+
         def close(self) -> None:
             self.protocol.connection_lost(None)
 

@@ -11,41 +11,67 @@ from compax_aio.transports.loopback import LoopbackListener, listen
 __all__ = ["Cable"]
 
 
+class End(Connection):
+    """The drive's end of one connection."""
+
+    def __init__(self, line: DeviceLine, connections: set[Connection], cable: Cable) -> None:
+        super().__init__(line, connections)
+        self._cable = cable
+
+    @property
+    def _half_open(self) -> set[Connection]:
+        return self._cable.forgotten
+
+    def data_received(self, data: bytes) -> None:
+        if not (self._cable.half_open or self in self._half_open):
+            super().data_received(data)
+
+    def _send(self, data: bytes) -> None:
+        if not self._cable.half_open:
+            super()._send(data)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        if self in self._half_open:
+            self._transport = None
+            self._connections.discard(self)
+        else:
+            super().connection_lost(exc)
+
+
 class Cable:
     """
     Serves a drive as ``loop://<name>`` while it is plugged in.
 
     Attributes:
-        half_open: While set, bytes vanish in both directions, and nobody is told: a connection that is half open.
+        half_open: While set, all bytes vanish in both directions, and nobody is told.
+        forgotten: Connections whose bytes vanish for good.
         opened: How often somebody has connected, or tried to while it was plugged in.
     """
 
     def __init__(self, name: str = "cable") -> None:
         self.url = f"loop://{name}"
-        self.half_open = False
         self.opened = 0
         self._name = name
         self._listener: LoopbackListener | None = None
         self._connections: set[Connection] = set()
+        self.half_open = False
+        self.forgotten: set[Connection] = set()
 
     async def plug(self, far: SimulatedDrive) -> None:
         """Lead to *far* from now on."""
-        cable, line = self, DeviceLine.of(far)
-
-        class End(Connection):
-            def data_received(self, data: bytes) -> None:
-                if not cable.half_open:
-                    super().data_received(data)
-
-            def _send(self, data: bytes) -> None:
-                if not cable.half_open:
-                    super()._send(data)
+        line = DeviceLine.of(far)
 
         def connected() -> End:
             self.opened += 1
-            return End(line, self._connections)
+            return End(line, self._connections, self)
 
         self._listener = await listen(self._name, connected)
+
+    def go_half_open(self) -> None:
+        """Let all bytes of those who are connected vanish, and tell nobody; who comes anew is served."""
+        for connection in self._connections:
+            self.forgotten.add(connection)
+            connection._line.disconnect()
 
     async def pull(self) -> None:
         """Lose the line, and let nobody connect."""

@@ -83,7 +83,7 @@ class Drive(Readings, AxisCommands):
         )
         super().__init__(line, Observer(line, self._on_fault))
         self._identity = Identity(line)
-        self._signs_of_restart: tuple[str, ...] = ()
+        self._signs_of_restart: dict[str, None] = {}
         self._motion = Motion(self._observer)
         self.parameters = Parameters(line)
         self.variables = NumberedValues(line, VARIABLE_TABLE)
@@ -95,15 +95,14 @@ class Drive(Readings, AxisCommands):
 
     async def _greet(self) -> None:
         """Look who is there and how it stands, before anything that can move is sent."""
-        signs = []
+        signs = self._signs_of_restart  # those of a greeting that was cut count, too
+        if self.settings.reconnect and await self._identity.check():
+            signs["the error history has a new power-on mark (S18)"] = None
         was_homed, is_homing = self._observer.is_homed, self._motion.is_homing
         status = await self._motion.look_around()
         if status is not None and was_homed and not status.machine_zero_approached and not is_homing:
-            signs.append("machine zero is not approached any more (S16 bit 3)")
+            signs["machine zero is not approached any more (S16 bit 3)"] = None
         await self._line.transfer.read_interface(Lane.GREETING)
-        if self.settings.reconnect and await self._identity.check():
-            signs.append("the error history has a new power-on mark (S18)")
-        self._signs_of_restart = tuple(signs)
 
     def __repr__(self) -> str:
         return f"<Drive {self.name} {'open' if self.is_open else 'closed'}>"
@@ -366,20 +365,26 @@ class Drive(Readings, AxisCommands):
     # What the line tells --------------------------------------------------------------------------------------------
 
     def _on_event(self, event: Event) -> None:
+        if not self._line.link.is_open:
+            self._on_early_event(event)
+            return
         at = self._loop.time()
-        # As long as it is not known who is there, a message ends no move of ours.
-        is_known = self._line.link.is_open
         if isinstance(event, PositionReached):
             self._events.publish(PositionMessage(self.name, at))
-            if is_known:
-                self._motion.position_reached()
+            self._motion.position_reached()
         elif isinstance(event, ComparatorReached):
             self._events.publish(ComparatorPassed(self.name, at, event.number))
-            if is_known:
-                self._motion.comparator_reached(event.number)
+            self._motion.comparator_reached(event.number)
         elif isinstance(event, Stray):
             self.stats.strays += 1
             self._events.publish(UnexpectedText(self.name, at, event.text))
+
+    def _on_early_event(self, event: Event) -> None:
+        """Take what came before it was known who is there: nobody is told, and no move is ended by it."""
+        if isinstance(event, PositionReached):
+            self._motion.forget_message()
+        elif isinstance(event, Stray):
+            self.stats.strays += 1
 
     def _on_fault(self, error: DeviceError | None) -> None:
         self._events.publish(Fault(self.name, self._loop.time(), error))
@@ -389,19 +394,18 @@ class Drive(Readings, AxisCommands):
         self._motion.line_lost(error)
 
     def _on_restored(self, restored: Restored) -> None:
-        if self._signs_of_restart:
+        signs, self._signs_of_restart = tuple(self._signs_of_restart), {}
+        if signs:
             _log.warning(
                 "%s seems to have been switched off and on: %s; prepared points, SPEED, ramps and the position "
                 "reference may be gone",
                 self.name,
-                " and ".join(self._signs_of_restart),
+                " and ".join(signs),
             )
         self._events.publish(
-            ConnectionRestored(
-                self.name, self._loop.time(), restored.after_s, restored.attempts, self._signs_of_restart
-            )
+            ConnectionRestored(self.name, self._loop.time(), restored.after_s, restored.attempts, signs)
         )
-        self._motion.line_restored(self._signs_of_restart)
+        self._motion.line_restored(signs)
 
     def _on_lost(self, error: ConnectionLostError) -> None:
         self._events.publish(ConnectionLost(self.name, self._loop.time(), str(error)))

@@ -11,7 +11,7 @@ from ..escaping import escaped
 
 __all__ = ["HalfDone", "RollBack"]
 
-_log = logging.getLogger(__name__)
+_log = logging.getLogger("compax_aio.compax")
 
 
 class HalfDone:

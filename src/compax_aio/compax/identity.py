@@ -51,14 +51,15 @@ class Identity:
         before, self._history = self._history, await self._read_history()
         return before is not None and self._history is not None and has_power_on_mark(before, self._history)
 
-    async def _learn(self) -> dict[int, str]:
+    async def _learn(self) -> dict[int, str] | None:
         values: dict[int, str] = {}
         for number in _IDENTIFICATION:
             try:
                 values[number] = await self._read(number)
             except (AnswerTimeoutError, CommandRejectedError, UnexpectedAnswerError) as error:
                 _log.info("%s does not say who it is (S%d): %s", self._line.name, number, error)
-                break
+                is_known = bool(values) or not isinstance(error, AnswerTimeoutError)
+                return values if is_known else None  # it is asked again the next time
         return values
 
     async def _compare(self, number: int, known: str) -> None:

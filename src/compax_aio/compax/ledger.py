@@ -129,4 +129,5 @@ class Ledger:
             self._next_marker += 1
             if not self._asked["S", str(number)]:
                 break
+        # Are all unanswered, it is the last one, again and again: the first answer to it makes the others free.
         return f"S{number}"

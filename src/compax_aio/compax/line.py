@@ -74,7 +74,8 @@ class DriveLine:
             UnexpectedAnswerError: It acknowledged a question instead of answering it.
             AnswerTimeoutError, ConnectionLostError: No answer came.
         """
-        outcome = await self.link.exchange(text, lane, survives_loss=True)
+        # What is asked in order to move does not wait for a line: a person who plugs in a cable expects no motion.
+        outcome = await self.link.exchange(text, lane, survives_loss=lane is not Lane.MOTION)
         if isinstance(outcome, Answered):
             return outcome.text
         raise self.error_of(text, outcome)

@@ -29,7 +29,7 @@ from .vocabulary import MovePlan, change_of_speed
 
 __all__ = ["Motion"]
 
-_log = logging.getLogger(__name__)
+_log = logging.getLogger("compax_aio.compax")
 
 
 class Motion:
@@ -52,6 +52,8 @@ class Motion:
         self._stopping: asyncio.Task[None] | None = None
         self.stops = 0
         """How many times a stop has been asked for."""
+        self.restarts = 0
+        """How many times the drive seemed to have been switched off and on while its line was lost."""
         self._timeout_s: float | None = None
 
     # Starting -------------------------------------------------------------------------------------------------------
@@ -252,6 +254,10 @@ class Motion:
         else:
             self._memory.messages_owed = max(0, self._memory.messages_owed - 1)
 
+    def forget_message(self) -> None:
+        """Take a ``$`` that came before it was known from whom: it ends nothing, and is not owed any more."""
+        self._memory.messages_owed = max(0, self._memory.messages_owed - 1)
+
     def comparator_reached(self, number: int) -> None:
         """Take a comparator's number that was just read."""
         # One that is passed on the ramp of a stop is not of the move that waits for it.
@@ -271,6 +277,7 @@ class Motion:
     def line_restored(self, signs_of_restart: tuple[str, ...]) -> None:
         """Let a move that is under way find its fate; before the next, settings are said again."""
         self._observer.line.transfer.forget_taken()
+        self.restarts += bool(signs_of_restart)
         if self._active is not None:
             self._active.line_restored(signs_of_restart)
 

@@ -81,11 +81,11 @@ class Observer:
         except (AnswerTimeoutError, CommandRejectedError, UnexpectedAnswerError):
             return None
 
-    async def look(self) -> Look:
+    async def look(self, lane: Lane = Lane.CONTROL) -> Look:
         """Read status, then position."""
-        status = await self.read_status()
+        status = await self.read_status(lane)
         try:
-            position: float | None = await self.line.position(Lane.CONTROL)
+            position: float | None = await self.line.position(lane)
         except (CommandRejectedError, UnexpectedAnswerError):
             position = None
         return Look(status, position)
@@ -102,17 +102,17 @@ class Observer:
                     raise
             await asyncio.sleep(self.line.settings.poll_first_s)
 
-    async def commanded_position(self) -> float:
+    async def commanded_position(self, lane: Lane = Lane.CONTROL) -> float:
         """Read S2, the target position (IBS p. 12), or S1 from a drive that has none to give."""
         try:
-            return await self.line.number(2, Lane.CONTROL)
+            return await self.line.number(2, lane)
         except (CommandRejectedError, UnexpectedAnswerError):
-            return await self.line.position(Lane.CONTROL)
+            return await self.line.position(lane)
 
-    async def standing_position(self) -> float:
+    async def standing_position(self, lane: Lane = Lane.CONTROL) -> float:
         """Read where a relative move begins: S2, unless the axis stands elsewhere, as after a stop; then S1."""
-        commanded = await self.commanded_position()
-        actual = await self.line.position(Lane.CONTROL)
+        commanded = await self.commanded_position(lane)
+        actual = await self.line.position(lane)
         return commanded if self.is_near(commanded, actual) else actual
 
     def is_near(self, position: float | None, target: float | None) -> bool:

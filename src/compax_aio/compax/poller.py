@@ -26,7 +26,7 @@ from .watch import Reading, Watch
 
 __all__ = ["Poller"]
 
-_log = logging.getLogger(__name__)
+_log = logging.getLogger("compax_aio.compax")
 
 _NAMED: Final = (
     "position",

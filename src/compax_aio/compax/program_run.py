@@ -162,13 +162,15 @@ class ProgramRun:
             DriveFaultError: The drive reports a fault.
             MoveStoppedError: The program was stopped (S16 bit 6, S17 bit 5), from here or by somebody else.
             MoveTimeoutError: It runs longer than *timeout_s*.
-            MoveInDoubtError: It does not run any more, but a stop was shown before it ended: it may have been stopped.
+            MoveInDoubtError: It does not run any more, but a stop was shown before it ended: it may have been stopped;
+                or the drive seems to have been switched off and on.
             AnswerTimeoutError, ConnectionLostError: The drive does not say how it stands; the program may run.
         """
         if timeout_s is not None and not check_number("timeout_s", timeout_s) > 0:
             raise InvalidCommandError(f"timeout_s must be above 0, not {timeout_s!r}")
         loop, mark = asyncio.get_running_loop(), self._motion.untracked.mark()
         give_up_at = None if timeout_s is None else loop.time() + timeout_s
+        restarts = self._motion.restarts
         showed_stop, interval_s = self._showed_stop, self._line.settings.poll_first_s
         while _is_at_work(status := await self._observer.patiently(self._observer.read_status)):
             await self._refuse_fault(status, "a fault has come while the program runs")
@@ -185,6 +187,10 @@ class ProgramRun:
             interval_s = min(interval_s * _POLL_GROWTH, self._line.settings.poll_slowest_s)
         self._motion.untracked.note_over(mark)
         await self._refuse_fault(status, "a fault ended the program")
+        if self._motion.restarts != restarts:
+            raise self._doubt(
+                "the drive seems to have been switched off and on: nobody can say how the program ended", None
+            )
         if status.shows_stop:
             raise self._ended_by_stop(status, showed_before=showed_stop)
 
@@ -200,7 +206,7 @@ class ProgramRun:
     async def _look_before(self, text: str, *, goes_on: bool) -> DriveStatus:
         """Return the status if START may be sent: *goes_on* if a program may be waiting for it."""
         self._motion.refuse_second(repr(text))
-        status = await self._observer.read_status()
+        status = await self._observer.read_status(Lane.MOTION)
         await self._refuse_fault(status, f"{text!r} was not sent, for the drive reports a fault")
         is_waiting = goes_on and status.ready_for_start
         if (status.program_running and not is_waiting) or (status.command_active and not status.shows_stop):

@@ -270,6 +270,9 @@ class CompaxProtocol:
 
     def _read_token(self, raw: bytes) -> None:
         """Read what stood before one prompt: usually one line or none, after noise or an echo more."""
+        if not raw:
+            self._read_prompt()
+            return
         lines = [line.strip(" \t>") for line in re.split(r"[\r\n]+", as_text(self._without_frame(raw)))]
         lines = [rest for line in lines if (rest := self._without_echo(line))]
         for line in lines[:-1]:

@@ -34,7 +34,7 @@ from .vocabulary import check_travel
 
 __all__ = ["Pursuit"]
 
-_log = logging.getLogger(__name__)
+_log = logging.getLogger("compax_aio.compax")
 
 _Value = TypeVar("_Value")
 
@@ -78,7 +78,7 @@ class Pursuit:
         self._stored: _Stored | None = None
         self._sent_as_frame = False
         self._signs_of_restart: tuple[str, ...] = ()
-        self._line_was_lost = False
+        self._line_was_lost = self._has_lost_line = False
 
     async def carry_out(self) -> None:
         """
@@ -104,8 +104,8 @@ class Pursuit:
         """Find out where the move begins, as far as it matters, and say everything but the motion itself."""
         plan = self.move.plan
         if plan.distance is not None:
-            self._refuse_if_active(await self._observer.look())
-            target = round(await self._observer.standing_position() + plan.distance, self._settings.decimals)
+            self._refuse_if_active(await self._observer.look(Lane.MOTION))
+            target = round(await self._observer.standing_position(Lane.MOTION) + plan.distance, self._settings.decimals)
             self.move.target = check_travel(target, self._settings)
         await self._line.transfer.say_settings(plan.settings_lines)
         for text in plan.point_lines:
@@ -200,14 +200,14 @@ class Pursuit:
 
     async def _look_before_homing(self) -> None:
         """Take note of what could be mistaken for its success: machine zero had been approached before."""
-        look = await self._observer.look()
+        look = await self._observer.look(Lane.MOTION)
         self._refuse_if_active(look)
         if look.status.machine_zero_approached:
             self._homed_before = look
 
     async def _look_before_preparing(self) -> None:
         """Find out now what would keep the motion from starting when the others start."""
-        look = await self._observer.look()
+        look = await self._observer.look(Lane.MOTION)
         self._refuse_if_active(look)
         if not look.status.no_fault:
             raise self._reports.fault(self.move, look, await self._observer.read_error())
@@ -284,13 +284,16 @@ class Pursuit:
     def line_restored(self, signs_of_restart: tuple[str, ...]) -> None:
         """Look at once, now that the line is back; a drive that was switched off cannot say how the move ended."""
         self._signs_of_restart += signs_of_restart
-        self._line_was_lost = True
+        self._line_was_lost = self._has_lost_line = True
         self._wake.set()
 
     def _refuse_after_restart(self, cause: CompaxError | None) -> None:
         if self._signs_of_restart:
-            signs = " and ".join(self._signs_of_restart)
-            raise self._doubt(f"the drive seems to have been switched off and on: {signs}", cause)
+            raise self._restart(cause)
+
+    def _restart(self, cause: CompaxError | None = None) -> MoveInDoubtError:
+        signs = " and ".join(self._signs_of_restart)
+        return self._doubt(f"the drive seems to have been switched off and on: {signs}", cause)
 
     def _was_acknowledged_by_prompt(self) -> bool:
         """Whether the motion's own prompt was read, if only in the same piece of bytes as its ``$``."""
@@ -354,6 +357,9 @@ class Pursuit:
         if self.move.plan.finds_machine_zero:
             return Verdict.UNCLEAR
         if self._is_at_target(look.position):
+            if self._has_lost_line and not look.status.position_reached:
+                # As after power-on, when an axis without machine zero counts from 0 again.
+                raise self._doubt("it stands at its target, and the drive does not say that it has reached it", None)
             return Verdict.REACHED
         if not look.status.position_reached:
             return Verdict.UNCLEAR
@@ -391,7 +397,9 @@ class Pursuit:
     def conclude_stopped(self, look: Look, fault: CompaxError | None, reason: CompaxError | None) -> None:
         """End the move by what was seen after a stop from here: it may have been there already."""
         verdict = self._judge(look)
-        if verdict is Verdict.REACHED:
+        if self._signs_of_restart:
+            self.move.fail(self._restart())
+        elif verdict is Verdict.REACHED:
             self.move.finish("status", look.position)
         else:
             self.move.fail(fault or reason or self._reports.stopped(self.move, look))

@@ -67,7 +67,7 @@ class Stop:
         while True:
             try:
                 outcome = await self._answer(give_up_at)
-            except (AnswerTimeoutError, ConnectionLostError) as error:
+            except CompaxError as error:
                 if self._observer.line.link.is_over:
                     raise
                 failure: CompaxError = error
@@ -112,11 +112,15 @@ class Stop:
         give_up_at = self._loop.time() + self._settings.standstill_timeout_s
         while True:
             try:
-                look = await self._observer.look()
+                async with asyncio.timeout_at(max(give_up_at, self._loop.time() + self._settings.answer_timeout_s)):
+                    look = await self._observer.look()
+            except TimeoutError:
+                raise self._nothing_heard() from None
             except CompaxError:
                 # One answer lost is no reason to give up a stop that was acknowledged.
                 if self._observer.line.link.is_over or self._loop.time() >= give_up_at:
                     raise
+                await asyncio.sleep(_PAUSE_S)
                 continue
             status = look.status
             # A fault has a ramp of its own; without current nothing can be waited for.
@@ -132,3 +136,13 @@ class Stop:
                     hint="use the emergency stop if it moves; a long stop ramp (P10) wants more standstill_timeout_s",
                 )
             await asyncio.sleep(_PAUSE_S)
+
+    def _nothing_heard(self) -> AnswerTimeoutError:
+        return AnswerTimeoutError(
+            f"STOP was acknowledged, but for {self._settings.standstill_timeout_s:g} s the drive has not said whether "
+            "it stands",
+            device=self._observer.line.name,
+            sent=self._settings.dialect.stop,
+            hint="look at the machine; use the emergency stop if it moves",
+            exchanges=self._observer.line.link.recent(),
+        )

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Transfer"]
 
-_log = logging.getLogger(__name__)
+_log = logging.getLogger("compax_aio.compax")
 
 _SETTING: Final = re.compile(r"(SPEED|SD|ACCEL-|AL-|ACCEL|AL)(?=[\d.+])")
 _SHORT: Final = {"SPEED": "SD", "ACCEL": "AL", "ACCEL-": "AL-"}
@@ -83,6 +83,7 @@ class Transfer:
     def _choose(self, interface: SerialInterface) -> None:
         """Use binary transfer, if the settings ask for it and P20 allows it (UG p. 166)."""
         line = self._line
+        line.protocol.encode = encode_ascii
         if line.settings.binary_settings and interface.binary:
             line.protocol.encode = BinaryTransfer(motion=line.settings.binary_motion).encode
         elif line.settings.binary_settings:

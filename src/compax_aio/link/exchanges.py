@@ -6,11 +6,14 @@ import asyncio
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Final
 
 from ..errors import CompaxError
 from .contract import Lane, TurnOver
 
 __all__ = ["Exchange", "ExchangeQueue"]
+
+_CROWD: Final = 16
 
 
 @dataclass(slots=True, eq=False)
@@ -25,6 +28,8 @@ class Exchange:
     """Whether it waits for a line that is lost, and may be sent again on it: it asks something, or stops."""
     attempt: int = 0
     """How often the line had been opened when it was queued."""
+    queued_at: float = 0.0
+    """Loop time."""
     on_sent: Callable[[], None] | None = None
     waiters: list[asyncio.Future[TurnOver]] = field(default_factory=list)
     times_ahead: int = 0
@@ -35,11 +40,19 @@ class Exchange:
     """Whether it was sent in its turn."""
     received: str | None = None
     """What had come until then."""
+    _crowded_at: int = _CROWD
 
     @property
     def is_wanted(self) -> bool:
         """Whether anybody waits for it."""
         return any(not waiter.done() for waiter in self.waiters)
+
+    def add_waiters(self, waiters: list[asyncio.Future[TurnOver]]) -> None:
+        """Let others wait for the same answer; those that have given up are forgotten from time to time."""
+        if len(self.waiters) >= self._crowded_at:
+            self.waiters = [waiter for waiter in self.waiters if not waiter.done()]
+            self._crowded_at = 2 * len(self.waiters) + _CROWD
+        self.waiters += waiters
 
     def begin_anew(self) -> None:
         """Forget that it was sent: the line on which it was is lost."""
@@ -74,7 +87,7 @@ class ExchangeQueue:
         """Queue *exchange*; a read joins another of the same text that waits already."""
         if exchange.lane is Lane.READ:
             if (shared := self._reads.get(exchange.text)) is not None:
-                shared.waiters += exchange.waiters
+                shared.add_waiters(exchange.waiters)
                 return
             self._reads[exchange.text] = exchange
         self._lanes[exchange.lane].append(exchange)

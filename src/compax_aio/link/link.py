@@ -11,7 +11,7 @@ import asyncio
 import logging
 from collections.abc import Awaitable, Callable
 from functools import partial
-from typing import cast
+from typing import Final, cast
 
 from ..errors import AnswerTimeoutError, CompaxError, ConnectionLostError, TransportError
 from ..transports.registry import open_transport
@@ -20,13 +20,43 @@ from .exchanges import Exchange
 from .failures import Failures
 from .port import Port
 from .reconnecting import Reconnecting
+from .seldom import Seldom
 from .stats import LinkStats
 from .turns import Turns
 from .wire import WireHistory
 
 __all__ = ["Link", "LinkStats"]
 
-_log = logging.getLogger("compax_aio.link")
+
+_SILENT_SHARE: Final = 1 / 2
+"""Of the time for which a lost line is waited for: so long a silence leaves some for a new attempt."""
+_SHORTEST_SILENCE_S: Final = 10.0
+"""A device that is busy, or whose only answer comes late, must not cost the connection."""
+
+
+class _End(asyncio.Protocol):
+    """One transport's hold on a link: what it says after its end, or after another one was taken, is not heard."""
+
+    def __init__(self, link: Link) -> None:
+        self._link: Link | None = link
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        if self._link is not None:
+            self._link.connection_made(transport)
+        else:
+            cast("asyncio.Transport", transport).abort()
+
+    def data_received(self, data: bytes) -> None:
+        if self._link is not None:
+            self._link.data_received(data)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        link, self._link = self._link, None
+        if link is not None:
+            link.connection_lost(exc)
+
+    def let_go(self) -> None:
+        self._link = None
 
 
 class Link(asyncio.Protocol):
@@ -60,6 +90,7 @@ class Link(asyncio.Protocol):
         self.stats = LinkStats()
         self.history = WireHistory()
         self._protocol = protocol
+        self._log = Seldom(logging.getLogger("compax_aio.link"), name)
         self._failures = Failures(name, self.history, answer_timeout_s, resync_attempts)
         self._on_lost = on_lost
         self._greet = greet
@@ -84,6 +115,7 @@ class Link(asyncio.Protocol):
         self._silence: AnswerTimeoutError | None = None
         self._is_renewing = False
         self._attempts = 0
+        self._end: _End | None = None
 
     # Opening and closing --------------------------------------------------------------------------------------------
 
@@ -110,13 +142,21 @@ class Link(asyncio.Protocol):
         in_step = self._turns.until_in_step()
         in_step.add_done_callback(lambda each: each.cancelled() or each.exception())  # if the opener fails, nobody asks
         try:
-            await open_transport(self._url, lambda: self)
+            await open_transport(self._url, self._take_end)
         except BaseException:
             in_step.cancel()
             raise
         await in_step
         if self._greet is not None:
             await self._greet()
+        if not self._port.is_there:  # lost in one breath with the last answer
+            raise self._lost(None)
+
+    def _take_end(self) -> _End:
+        if self._end is not None:
+            self._end.let_go()
+        self._end = _End(self)
+        return self._end
 
     async def close(self) -> None:
         """Close the line; what still waits fails with ConnectionLostError. Takes at most a second or two."""
@@ -160,12 +200,11 @@ class Link(asyncio.Protocol):
         """Let everything that waits go over the line."""
         if self._attempts > 1:
             self.stats.reconnects += 1
-        self._turns.queue.is_admitted = True
-        self._turns.pump()
+        self._turns.admit()
 
     def lose_patience(self) -> None:
-        """Fail what waits for the lost line."""
-        self._turns.fail_waiting(self._lost)
+        """Fail what waits for the lost line, but for what was asked since the last attempt: it waits for the next."""
+        self._turns.fail_waiting(self._lost, but=self._waits_for_line)
 
     def give_up(self, error: CompaxError) -> None:
         """Take note that the line is lost for good."""
@@ -218,7 +257,9 @@ class Link(asyncio.Protocol):
         """
         waiter: asyncio.Future[TurnOver] = self._loop.create_future()
         survives_loss &= lane is not Lane.GREETING
-        exchange = Exchange(text, lane, settles_late, survives_loss, self._attempts, on_sent, [waiter])
+        exchange = Exchange(
+            text, lane, settles_late, survives_loss, self._attempts, self._loop.time(), on_sent, [waiter]
+        )
         if not self._takes(exchange):
             waiter.set_exception(self._lost(exchange))
             return waiter
@@ -230,7 +271,7 @@ class Link(asyncio.Protocol):
     def _takes(self, exchange: Exchange) -> bool:
         if self.is_over or self._port.is_there or self._is_renewing:
             return not self.is_over
-        return exchange.survives_loss and self._reconnecting is not None and self._reconnecting.is_patient
+        return exchange.survives_loss and self._reconnecting is not None
 
     def hold_reads(self, for_s: float) -> None:
         """Let what waits in ``Lane.READ`` wait on, at most *for_s* from now; what is on the wire goes on."""
@@ -248,6 +289,11 @@ class Link(asyncio.Protocol):
         """Return the last exchanges of this line, oldest first, readable."""
         return self.history.lines()
 
+    def check_whether_lost(self) -> None:
+        """Raise ConnectionLostError if there is no line now; it may come back."""
+        if self.is_over or not (self._port.is_there or self._is_renewing):
+            raise self._lost(None)
+
     # What asyncio calls ---------------------------------------------------------------------------------------------
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -264,11 +310,12 @@ class Link(asyncio.Protocol):
         if not self._port.is_there:  # any more
             return
         self._port.received(data)
-        self._turns.receive(data)
+        self._port.in_pieces(data, self._turns.receive)
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Fail what tells something: nobody can say any more what becomes of it. What asks may wait for the line."""
         self._port.ended()
+        self._silence = None
         self._turns.line_lost()
         if self._is_renewing:
             return
@@ -278,7 +325,7 @@ class Link(asyncio.Protocol):
             return
         error = self._lost(None, exc)
         if self._reconnecting is not None:
-            _log.warning("%s", error)
+            self._log.tell(logging.WARNING, "%s", error.what)
             self._reconnecting.begin(self, error, at_once=False)
         else:
             self._is_lost = True
@@ -288,7 +335,13 @@ class Link(asyncio.Protocol):
         self._turns.fail_waiting(lambda exchange: self._lost(exchange, cause), but=self._waits_for_line)
 
     def _waits_for_line(self, exchange: Exchange) -> bool:
-        return exchange.survives_loss and self._reconnecting is not None and not self.is_over
+        """Whether it goes on waiting: for so long as anybody waits; after that, for the attempt that comes next."""
+        reconnecting = self._reconnecting
+        if not exchange.survives_loss or reconnecting is None or self.is_over:
+            return False
+        if not reconnecting.is_patient:
+            return exchange.attempt == self._attempts
+        return self._loop.time() - exchange.queued_at < reconnecting.patience_s
 
     def _came_during_attempt(self, exchange: Exchange) -> bool:
         """Whether it was asked on a line that is lost while that was being opened: the next attempt is its first."""
@@ -299,8 +352,9 @@ class Link(asyncio.Protocol):
         """Let a line on which nothing has come for long be opened anew when it is used next: it may lead nowhere."""
         if self._reconnecting is not None and self._turns.queue.is_admitted:
             silent_s = self._loop.time() - self._port.heard_at
-            is_long = silent_s >= self._reconnecting.patience_s
-            self._silence = self._failures.silence(None) if is_long else None
+            is_long = silent_s >= max(self._reconnecting.patience_s * _SILENT_SHARE, _SHORTEST_SILENCE_S)
+            leads_nowhere = self._port.is_stuck or is_long
+            self._silence = self._failures.silence(None) if leads_nowhere else None
 
     def _renew(self, silence: AnswerTimeoutError) -> None:
         assert self._reconnecting is not None

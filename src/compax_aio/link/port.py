@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections.abc import Callable
+from typing import Final
 
 from .stats import LinkStats
 from .wire import WireHistory, readable
@@ -13,8 +15,15 @@ __all__ = ["Port"]
 _log = logging.getLogger("compax_aio.link")
 _wire_log = logging.getLogger("compax_aio.link.wire")
 
-_CLOSE_GRACE_S = 0.5
-_ABORT_GRACE_S = 1.0
+_CLOSE_GRACE_S: Final = 0.5
+_ABORT_GRACE_S: Final = 1.0
+
+_PIECE_BYTES: Final = 64
+"""Read at once: two answers, or at worst half a millisecond's work …"""
+_BETWEEN_PIECES_S: Final = 0.001
+"""… and then not for so long: five times what comes at 115,200 baud, and others have the event loop meanwhile."""
+_MOST_UNSENT_BYTES: Final = 1024
+"""More than that waits only on a line that takes nothing: one command is outstanding at a time."""
 
 
 class Port:
@@ -33,6 +42,7 @@ class Port:
         self._history = history
         self._loop = asyncio.get_running_loop()
         self._transport: asyncio.Transport | None = None
+        self._unread = bytearray()
         self._end: asyncio.Future[None] | None = None
         self.heard_at = 0.0
         """Loop time at which something came last, or the transport was taken."""
@@ -45,8 +55,14 @@ class Port:
     def opened(self, transport: asyncio.Transport) -> None:
         """Take a transport."""
         self._transport = transport
+        self._unread.clear()
         self.heard_at = self._loop.time()
         self._end = self._loop.create_future()
+
+    @property
+    def is_stuck(self) -> bool:
+        """Whether the far end takes nothing, and more has been written than it will ever be well to send."""
+        return self._transport is not None and self._transport.get_write_buffer_size() > _MOST_UNSENT_BYTES
 
     def ended(self) -> None:
         """Take note that the transport has reported its end."""
@@ -71,6 +87,28 @@ class Port:
         self._history.received(self.heard_at, data)
         if _wire_log.isEnabledFor(logging.DEBUG):
             _wire_log.debug("%s ← %s", self._name, readable(data))
+
+    def in_pieces(self, data: bytes, read: Callable[[bytes], None]) -> None:
+        """Hand *data* to *read*: the first piece at once, each other a while later, before more is taken."""
+        if len(data) <= _PIECE_BYTES and not self._unread:
+            read(data)
+            return
+        is_at_it = bool(self._unread)
+        self._unread += data
+        if not is_at_it and self._transport is not None:
+            self._transport.pause_reading()
+            self._read_piece(self._transport, read)
+
+    def _read_piece(self, transport: asyncio.Transport, read: Callable[[bytes], None]) -> None:
+        if transport is not self._transport:  # the line was lost meanwhile
+            return
+        piece = bytes(self._unread[:_PIECE_BYTES])
+        del self._unread[:_PIECE_BYTES]
+        if self._unread:
+            self._loop.call_later(_BETWEEN_PIECES_S, self._read_piece, transport, read)
+        else:
+            transport.resume_reading()
+        read(piece)
 
     def hang_up(self) -> None:
         """Let go of the transport at once; it reports its end soon."""

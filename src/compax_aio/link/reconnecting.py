@@ -6,15 +6,13 @@ import asyncio
 import logging
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from itertools import count
 from random import Random
 from typing import Final, Protocol
 
 from ..errors import CompaxError, ConnectionLostError
+from .seldom import Seldom
 
 __all__ = ["Backoff", "LostLine", "Reconnecting", "Restored"]
-
-_log = logging.getLogger("compax_aio.link")
 
 _GROWTH: Final = 2.0
 _LEAST_SHARE: Final = 0.5
@@ -38,7 +36,7 @@ class Backoff:
     def pauses_s(self, random: Random) -> Iterator[float]:
         """Yield the pause before each attempt: a random one from half of what it is at most, up to that."""
         at_most_s = min(self.first_s, self.slowest_s)
-        for _ in count() if self.attempts is None else range(self.attempts):
+        while True:
             yield at_most_s * random.uniform(_LEAST_SHARE, 1.0)
             at_most_s = min(at_most_s * _GROWTH, self.slowest_s)
 
@@ -98,6 +96,7 @@ class Reconnecting:
         self._backoff = backoff
         self._on_down = on_down
         self._on_restored = on_restored
+        self._log = Seldom(logging.getLogger("compax_aio.link"), name)
         self._loop = asyncio.get_running_loop()
         self._random = Random(repr(name))
         self._pauses_s = backoff.pauses_s(self._random)
@@ -117,7 +116,6 @@ class Reconnecting:
 
         self._timer = self._loop.call_later(self.patience_s, lose_patience)
         self._task = self._loop.create_task(self._try(line, error, at_once=at_once), name=f"{self._name}: reconnect")
-        self._on_down(error)
 
     async def end(self) -> None:
         """Try no more."""
@@ -127,30 +125,43 @@ class Reconnecting:
             task.cancel()
             await asyncio.wait([task])
 
-    async def _try(self, line: LostLine, error: CompaxError, *, at_once: bool) -> None:
+    async def _try(self, line: LostLine, loss: ConnectionLostError, *, at_once: bool) -> None:
         lost_at = self._loop.time()
+        self._on_down(loss)
+        error: CompaxError = loss
         attempts = 0
-        for pause_s in self._pauses_s:
+        while self._backoff.attempts is None or attempts < self._backoff.attempts:
+            pause_s = next(self._pauses_s)
             await asyncio.sleep(0 if at_once and not attempts else pause_s)
             attempts += 1
-            try:
-                await line.reopen()
-            except CompaxError as failure:
-                error = failure
-                _log.log(logging.WARNING if attempts == 1 else logging.DEBUG, "%s is still lost: %s", self._name, error)
-                continue
-            except Exception as defect:  # of a transport's plugin, say: nobody shall wait for ever
-                _log.exception("%s: the line cannot be opened again", self._name)
-                error = ConnectionLostError(f"{type(defect).__name__}: {defect}", device=self._name)
-                break
-            self._restored_at = self._loop.time()
-            self._relax()
-            _log.info("%s is back after %.3g s, at attempt %d", self._name, self._restored_at - lost_at, attempts)
-            self._on_restored(Restored(self._restored_at - lost_at, attempts))
-            line.admit()
-            return
+            failure = await self._attempt(line)
+            if failure is None:
+                self._restored_at = self._loop.time()
+                self._relax()
+                after_s = self._restored_at - lost_at
+                self._log.tell(logging.INFO, "the line is back after %.3g s, at attempt %d", after_s, attempts)
+                self._on_restored(Restored(after_s, attempts))
+                line.admit()
+                return
+            error = failure
+            self._log.tell(logging.WARNING, "the line is still lost: %s", error.what)
         self._relax()
         line.give_up(error)
+
+    async def _attempt(self, line: LostLine) -> CompaxError | None:
+        """Open the line once; return why it could not be, whatever a transport of somebody else raises."""
+        try:
+            await line.reopen()
+        except CompaxError as failure:
+            return failure
+        except (Exception, asyncio.CancelledError) as defect:
+            task = asyncio.current_task()
+            if isinstance(defect, asyncio.CancelledError) and (task is None or task.cancelling()):
+                raise
+            odd = ConnectionLostError(f"{type(defect).__name__}: {defect}", device=self._name)
+            odd.__cause__ = defect
+            return odd
+        return None
 
     def _relax(self) -> None:
         self.is_patient = True

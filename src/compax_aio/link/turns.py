@@ -13,17 +13,16 @@ from collections.abc import Callable
 from functools import partial
 
 from ..errors import CompaxError
-from .contract import DeviceProtocol, Event, HoldOver, InStep, LateEnding, MarkerSpent, TurnOver
+from .contract import DeviceProtocol, Event, HoldOver, InStep, Lane, LateEnding, MarkerSpent, TurnOver
 from .deadline import Deadline
 from .exchanges import Exchange, ExchangeQueue
 from .failures import Failures
 from .port import Port
+from .seldom import Seldom
 from .stats import LinkStats
 from .wire import WireHistory
 
 __all__ = ["Turns"]
-
-_log = logging.getLogger("compax_aio.link")
 
 
 class Turns:
@@ -62,7 +61,7 @@ class Turns:
         self.lines_sent = 0
         self.queue = ExchangeQueue()
         self._protocol = protocol
-        self._name = name
+        self._log = Seldom(logging.getLogger("compax_aio.link"), name)
         self._port = port
         self._stats = stats
         self._failures = failures
@@ -75,9 +74,11 @@ class Turns:
         self._loop = asyncio.get_running_loop()
         self._reads_timer: asyncio.TimerHandle | None = None
         self._outstanding: Exchange | None = None
+        self._unproved: list[tuple[Exchange, TurnOver]] = []
+        """Stops that were acknowledged before it was known by whom."""
         self._doubtful: Exchange | None = None
         self._in_step: asyncio.Future[None] | None = None
-        self._markers_left = 0
+        self._markers_left = self._more_markers = 0
         self._is_pursuing = False
         self._may_send_ahead = False
         self._is_reading = False
@@ -130,6 +131,14 @@ class Turns:
         if self._protocol.is_busy:
             self._protocol.time_ran_out()
         self.release_reads()
+
+    def admit(self) -> None:
+        """Let everything that waits go: it is known who is there."""
+        self.queue.is_admitted = True
+        for exchange, outcome in self._unproved:
+            exchange.end(outcome)
+        self._unproved.clear()
+        self.pump()
 
     def end(self) -> None:
         """Send nothing any more."""
@@ -195,12 +204,15 @@ class Turns:
             if self._protocol.in_doubt:
                 self._begin_doubt()
             if exchange is not None:
-                exchange.end(event)
+                self._end(exchange, event)
         elif isinstance(event, LateEnding):
             self._stats.late_answers += 1
-            _log.info("%s: the answer to %r came late", self._name, event.sent)
+            self._log.tell(logging.INFO, "the answer to %r came late", event.sent)
+            if self._is_pursuing and not self._markers_left and self._more_markers:
+                self._more_markers -= 1
+                self._markers_left = 1  # the device speaks: the next marker may be the one that is answered in time
             if self._doubtful is not None and self._doubtful.text == event.sent:
-                self._doubtful.end(event.outcome)
+                self._end(self._doubtful, event.outcome)
         elif isinstance(event, InStep):
             self._end_doubt()
         elif isinstance(event, HoldOver):
@@ -209,10 +221,16 @@ class Turns:
             self._ensure_doubt_is_pursued()
             self._on_event(event)
 
+    def _end(self, exchange: Exchange, outcome: TurnOver) -> None:
+        if exchange.lane is Lane.STOP and not self.queue.is_admitted:
+            self._unproved.append((exchange, outcome))
+        else:
+            exchange.end(outcome)
+
     # Doubt ----------------------------------------------------------------------------------------------------------
 
     def _begin_doubt(self) -> None:
-        self._markers_left = self._resync_attempts
+        self._markers_left = self._more_markers = self._resync_attempts
         self._is_pursuing = True
         self._may_send_ahead = True
 
@@ -222,9 +240,11 @@ class Turns:
 
     def _pursue_doubt(self) -> bool:
         """Send the next thing that helps to get in step; False when there is nothing left to try."""
-        if not self._markers_left:
-            return False
         stop = self.queue.first_stop()
+        if stop is not None and not stop.times_ahead:
+            self._markers_left = max(self._markers_left, 1)  # one that comes late has its chance, too
+        if not self._markers_left or self._port.is_stuck:
+            return False
         if self._protocol.held is not None:
             if stop is None:
                 return False
@@ -277,8 +297,9 @@ class Turns:
         self._markers_left = 0
         self._is_pursuing = False
         waiting = [exchange for exchange in (self._doubtful, self._outstanding) if exchange is not None]
-        waiting += self.queue.take_all()
+        waiting += [exchange for exchange, _ in self._unproved] + self.queue.take_all()
         self._outstanding = self._doubtful = None
+        self._unproved.clear()
         for exchange in waiting:
             if but(exchange):
                 exchange.begin_anew()
@@ -303,7 +324,7 @@ class Turns:
         if self._outstanding is not None:
             self._stats.timeouts += 1
             exchange, self._outstanding = self._outstanding, None
-            _log.warning("%s: no answer to %r within %g s", self._name, exchange.text, self._answer_timeout_s)
+            self._log.tell(logging.WARNING, "no answer to %r within %g s", exchange.text, self._answer_timeout_s)
             exchange.is_late = True
             self._doubtful = exchange
             exchange.received = self._history.received_since_sent()

@@ -22,6 +22,8 @@ _Ts = TypeVarTuple("_Ts")
 _REAL_SILENCE_S = 0.002
 # What is written to a terminal is handed on by another task of the kernel, which has to get its turn.
 _REAL_SILENCE_OF_TERMINALS_S = 0.01
+# Asking the operating system costs more than most callbacks; where there is nothing to be seen, it is asked so rarely.
+_LOOKS_LEFT_OUT = 50
 
 
 class VirtualClockLoop(asyncio.SelectorEventLoop):
@@ -103,6 +105,7 @@ class _JumpingSelector(selectors.BaseSelector):
         self._loop = loop
         self._selector = selectors.DefaultSelector()
         self._terminals: set[int] = set()
+        self._looks_left = 0
 
     def register(self, fileobj: FileDescriptorLike, events: int, data: Any = None) -> selectors.SelectorKey:
         key = self._selector.register(fileobj, events, data)
@@ -119,7 +122,7 @@ class _JumpingSelector(selectors.BaseSelector):
         return self._selector.modify(fileobj, events, data)
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
-        ready = self._selector.select(0)
+        ready = [] if self._has_nothing_to_see() else self._selector.select(0)
         if ready or timeout == 0:
             return ready
         if timeout is None or self._loop.waits_for_threads:
@@ -131,6 +134,14 @@ class _JumpingSelector(selectors.BaseSelector):
                 return ready
         self._loop.jump(max(timeout, 0.0))
         return []
+
+    def _has_nothing_to_see(self) -> bool:
+        """Whether only the loop's own descriptor is there, and no thread that would write to it; now and then not."""
+        self._looks_left -= 1
+        if len(self._selector.get_map()) > 1 or self._loop.waits_for_threads or self._looks_left <= 0:
+            self._looks_left = _LOOKS_LEFT_OUT
+            return False
+        return True
 
     def close(self) -> None:
         self._selector.close()

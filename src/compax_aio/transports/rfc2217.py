@@ -19,7 +19,7 @@ __all__ = ["open_rfc2217"]
 
 _FORM: Final = "rfc2217://192.168.1.50:2217?baudrate=9600"
 
-_log = logging.getLogger(__name__)
+_log = logging.getLogger("compax_aio.transports")
 
 
 async def open_rfc2217(url: TransportURL, protocol_factory: ProtocolFactory) -> asyncio.Transport:

@@ -6,6 +6,7 @@ import asyncio
 import os
 import threading
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Final
 
@@ -126,7 +127,10 @@ async def _open_in_thread(open_named: Callable[[], tuple[str, Port]]) -> tuple[s
                 return
         port.close()
 
-    working = asyncio.get_running_loop().run_in_executor(None, work)
+    # Of its own: ports that hang in those of the loop would leave none for others.
+    own_thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="opens a serial port")
+    working = asyncio.get_running_loop().run_in_executor(own_thread, work)
+    own_thread.shutdown(wait=False)
     try:
         # Shielded, so that a thread that cannot be stopped still counts as being at work.
         await asyncio.shield(working)

@@ -12,7 +12,7 @@ from .binary import shown
 from .console import Console
 from .inputs import Inputs
 from .knobs import Knobs
-from .log import Log, LogKind
+from .log import MAX_ENTRIES, Log, LogKind
 from .machine import Machine, Message, MessageKind
 from .port import Received, ReceivedFrame, ReceivedLine, SerialPort
 from .refusals import RefusedError
@@ -48,6 +48,7 @@ class SimulatedDrive:
     Args:
         knobs: Behaviour and mechanics.
         name: For messages and tests.
+        log_entries: How much of what it has done is kept.
 
     Attributes:
         log: What the drive has done, oldest first.
@@ -59,10 +60,12 @@ class SimulatedDrive:
         delay_position_reached_s: Fault hook: ``$`` is sent so much later than it should be.
     """
 
-    def __init__(self, knobs: Knobs | None = None, *, name: str = "drive") -> None:
+    def __init__(
+        self, knobs: Knobs | None = None, *, name: str = "drive", log_entries: int = MAX_ENTRIES
+    ) -> None:
         self.knobs = knobs or Knobs()
         self.name = name
-        self.log = Log()
+        self.log = Log(log_entries)
         self.silent = False
         self.deaf = False
         self.lose_answers = 0
@@ -273,21 +276,21 @@ class SimulatedDrive:
 
     def _next_event(self) -> tuple[float, Callable[[], None]] | None:
         """Find what happens next; of events at the same time the first of this list."""
-        first: tuple[float, Callable[[], None]] | None = None
-        for at, event in (
-            (self._machine.next_event_at(), self._machine_event),
-            (self._port.next_event_at(), self._port_event),
-            (self._turn_ends_at(), self._turn_event),
-            (self._delayed[0][0] if self._delayed else None, self._delayed_event),
-        ):
-            if at is not None and (first is None or at < first[0]):
-                first = at, event
-        return first
+        # Written out, for it is asked several times a line.
+        first_at, event = self._machine.next_event_at(), self._machine_event
+        if (at := self._port.next_event_at()) is not None and (first_at is None or at < first_at):
+            first_at, event = at, self._port_event
+        if (at := self._turn_ends_at()) is not None and (first_at is None or at < first_at):
+            first_at, event = at, self._turn_event
+        if self._delayed and (first_at is None or self._delayed[0][0] < first_at):
+            first_at, event = self._delayed[0][0], self._delayed_event
+        return None if first_at is None else (first_at, event)
 
     def _turn_ends_at(self) -> float | None:
-        if self._turn is _Turn.PREPARING:
+        turn = self._turn
+        if turn is _Turn.PREPARING:
             return self._prepared_at
-        if self._turn is _Turn.HOLDING:
+        if turn is _Turn.HOLDING:
             return self._prepared_at + self._extra_answer_delay_s
         return None
 

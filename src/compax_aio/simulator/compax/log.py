@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
-__all__ = ["Log", "LogEntry", "LogKind"]
+__all__ = ["MAX_ENTRIES", "Log", "LogEntry", "LogKind"]
 
-_MAX_ENTRIES: Final = 20_000
+MAX_ENTRIES: Final = 20_000
 
 
 class LogKind(StrEnum):
@@ -62,10 +62,15 @@ class LogEntry:
 
 
 class Log(deque[LogEntry]):
-    """The last things that happened, oldest first; old ones fall off at the end."""
+    """
+    The last things that happened, oldest first; old ones fall off at the end.
 
-    def __init__(self) -> None:
-        super().__init__(maxlen=_MAX_ENTRIES)
+    Args:
+        entries: How many are kept.
+    """
+
+    def __init__(self, entries: int = MAX_ENTRIES) -> None:
+        super().__init__(maxlen=entries)
 
     def add(self, at: float, kind: LogKind, text: str = "") -> None:
         """Append an entry."""

@@ -222,9 +222,10 @@ class Machine:
 
     def next_event_at(self) -> float | None:
         """Return when something happens by itself next."""
-        return min(
-            (at for at in (self.axis.next_event_at(), self.program.next_event_at()) if at is not None), default=None
-        )
+        axis_at, program_at = self.axis.next_event_at(), self.program.next_event_at()
+        if axis_at is None or program_at is None:
+            return program_at if axis_at is None else axis_at
+        return min(axis_at, program_at)
 
     def step(self, now: float) -> Message | None:
         """Let the next event, which must be due, happen; return what is to be said about it."""

@@ -1,0 +1,171 @@
+"""Runs one scenario from opening the lines to leaving the block, in virtual time, and gives what was seen."""
+
+from __future__ import annotations
+
+import asyncio
+import gc
+import logging
+import tempfile
+from pathlib import Path
+from typing import Final
+
+import compax_aio
+from compax_aio.errors import CompaxError
+from compax_aio.simulator.clock import VirtualClockLoop
+from compax_aio.simulator.compax.drive import SimulatedDrive
+from compax_aio.simulator.line import DeviceLine
+
+from .actions import ACTIONS
+from .scenario import Action, DrivePlan, Scenario, Trouble
+from .stage import Stage
+from .testimony import Seen, SeenAxis
+from .troubled_line import TroubledLine
+from .troubles import Far, befall
+from .weighing import weigh
+
+__all__ = ["PROGRAM_TARGET", "simulate"]
+
+LONGEST_S: Final = 3600.0
+"""Of virtual time: what has not ended then never will."""
+PROGRAM_TARGET: Final = 333.0
+"""Where the program in every drive goes, from where its axis has its positions."""
+_AFTERWARDS_S: Final = 60.0
+"""So long it is watched whether an axis that was left begins to move."""
+
+
+def simulate(scenario: Scenario) -> Seen:
+    """Run *scenario*; two runs of the same one are the same to the last byte."""
+    testimony = Seen(scenario)
+    logging.getLogger("compax_aio").setLevel(logging.CRITICAL + 1)
+    loop = VirtualClockLoop()
+    try:
+        with tempfile.TemporaryDirectory(prefix="hunt") as folder:
+            loop.run_until_complete(_run(testimony, Path(folder)))
+        loop.run_until_complete(loop.shutdown_default_executor())
+    finally:
+        # Without a runner, which waits for every task: one that cannot be cancelled is what we look for.
+        loop.close()
+    return testimony
+
+
+async def _run(testimony: Seen, folder: Path) -> None:
+    loop = asyncio.get_running_loop()
+    loop.set_exception_handler(lambda _, context: testimony.complaints.append(_told(context)))
+    stage = Stage(testimony, folder)
+    scenario = testimony.scenario
+    for plan in scenario.drives:
+        _build(stage, plan)
+    opening = {plan.axis: asyncio.ensure_future(_open(stage, plan)) for plan in scenario.drives}
+    troubles = [asyncio.ensure_future(_befall(stage, trouble)) for trouble in scenario.troubles]
+    users = [asyncio.ensure_future(_act(stage, action, opening)) for action in scenario.actions]
+    begins_s = max((each.at_s for each in (*scenario.actions, *scenario.troubles)), default=0.0)
+    await asyncio.wait(opening.values(), timeout=begins_s)
+    await asyncio.sleep(max(0.0, begins_s - loop.time()))
+    await _all_ended([*opening.values(), *users], testimony, "a caller waits for ever")
+    testimony.left_at = loop.time()
+    await _all_ended(troubles, testimony, "a trouble does not end")
+    for axis in testimony.axes.values():
+        _heal(stage, axis)
+    await _all_ended([asyncio.ensure_future(_leave(stage, axis)) for axis in stage.drives], testimony, "no leaving")
+    for axis in testimony.axes.values():
+        axis.moving_at_end, axis.motions_at_end = axis.far.moving, len(axis.motions)
+    testimony.lasted_s = loop.time()
+    await asyncio.sleep(_AFTERWARDS_S)
+    for line in stage.lines.values():
+        line.close()
+    for name in stage.drives:
+        _weigh(stage, name)
+    stage.drives.clear()
+    gc.collect(0)
+    left = asyncio.all_tasks() - {asyncio.current_task()}
+    testimony.left += [repr(task) for task in left]
+    for task in left:
+        task.cancel()
+    if left:
+        await asyncio.wait(left, timeout=LONGEST_S)
+
+
+def _build(stage: Stage, plan: DrivePlan) -> None:
+    """Put a drive, and the line to it, where the client will find them."""
+    far = SimulatedDrive(plan.knobs, name=plan.axis)
+    base = plan.knobs.position
+    far.load_program(["WAIT 100", f"POSA {base + PROGRAM_TARGET:.2f}", "END"])
+    axis = SeenAxis(plan, far)
+    stage.testimony.axes[plan.axis] = axis
+    stage.lines[plan.axis] = TroubledLine(plan.axis, far, axis.wire)
+    if plan.left_over:
+        DeviceLine.of(far).receive(plan.left_over)
+
+
+async def _open(stage: Stage, plan: DrivePlan) -> None:
+    call = stage.note(plan.number, plan.axis, "connect")
+    work = _connect(stage.lines[plan.axis].url, plan)
+    if (drive := await stage.tell(call, work)) is not None:
+        stage.drives[plan.axis] = drive
+
+
+async def _connect(url: str, plan: DrivePlan) -> compax_aio.Drive:
+    return await compax_aio.connect(url, name=plan.axis, settings=plan.settings)
+
+
+async def _befall(stage: Stage, trouble: Trouble) -> None:
+    await asyncio.sleep(trouble.at_s)
+    for axis in trouble.axes or tuple(stage.lines)[:1]:
+        await befall(trouble, Far(stage.axis(axis).far, stage.lines[axis]))
+        if trouble.kind == "flood":
+            _weigh(stage, axis)
+
+
+async def _act(stage: Stage, action: Action, opening: dict[str, asyncio.Task[None]]) -> None:
+    """Let a user do something, and perhaps give it up."""
+    await asyncio.sleep(action.at_s)
+    await asyncio.wait([opening[axis] for axis in action.axes])
+    if not all(axis in stage.drives for axis in action.axes):
+        return
+    task = asyncio.ensure_future(ACTIONS[action.kind].do(stage, action))
+    if action.gives_up is not None:
+        after_s, steps = action.gives_up
+        await asyncio.wait([task], timeout=after_s)
+        for _ in range(steps):
+            await asyncio.sleep(0)
+        task.cancel()
+    await asyncio.wait([task])
+    if not task.cancelled() and (error := task.exception()) is not None:
+        stage.testimony.complaints.append(f"item {action.number}: {error!r}")
+
+
+def _weigh(stage: Stage, axis: str) -> None:
+    if axis in stage.drives:
+        stage.axis(axis).weight = max(stage.axis(axis).weight, weigh(stage.drives[axis]))
+
+
+def _heal(stage: Stage, axis: SeenAxis) -> None:
+    """Let every line, and every drive, work from now on."""
+    stage.lines[axis.plan.axis].heal()
+    axis.far.lose_answers = 0
+    axis.far.lose_position_reached = 0
+
+
+async def _leave(stage: Stage, axis: str) -> None:
+    """Ask once more, for that must work, and leave the block."""
+    drive = stage.drives[axis]
+    if drive.is_open:
+        for what in ("settle", "settle", "probe"):
+            await stage.tell(stage.note(-1, axis, what), drive.position())
+    await stage.tell(stage.note(-1, axis, "close"), drive.close())
+
+
+async def _all_ended(tasks: list[asyncio.Task[None]], testimony: Seen, complaint: str) -> None:
+    if not tasks:
+        return
+    _, waiting = await asyncio.wait(tasks, timeout=LONGEST_S)
+    if waiting:
+        testimony.complaints.append(f"{complaint}: {len(waiting)}")
+        for task in waiting:
+            task.cancel()
+        await asyncio.wait(waiting, timeout=LONGEST_S)
+
+
+def _told(context: dict[str, object]) -> str:
+    error = context.get("exception")
+    return f"{context.get('message')}: {error!r}" + (f" {error}" if isinstance(error, CompaxError) else "")

@@ -1,0 +1,235 @@
+"""What can befall a drive and its line: how each kind is drawn, and how it is done."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from random import Random
+from typing import Any, Final
+
+from compax_aio.compax.facts.line import PROMPT
+from compax_aio.simulator.clock import VirtualClockLoop
+from compax_aio.simulator.compax.drive import SimulatedDrive
+from compax_aio.simulator.compax.instructions import MoveTo
+from compax_aio.simulator.compax.knobs import Knobs
+from compax_aio.simulator.compax.refusals import RefusedError
+
+from .scenario import Trouble
+from .troubled_line import Tamper, TroubledLine
+
+__all__ = ["LASTS_S", "PANEL_TARGET", "TROUBLES", "Far", "TroubleKind", "befall"]
+
+PANEL_TARGET: Final = 777.0
+"""Where a drive goes that is moved at its own panel."""
+
+LASTS_S: Final = (0.0, 0.003, 0.02, 0.05, 0.2, 0.4, 0.7, 1.5, 6.0)
+_HALF_LINES: Final = (b"PA5", b"POSR 1", b"PA17.5$", b"S1", b"P40=", b"GOTO", b"SD 1", b"?", b"S0", b"PR3 SD")
+_NOISE: Final = (b"\x00\xff", b"\xa5?", b"?\r\n", b"S0", b"\r\n", b">", b"\xc1\xc1\xc1", b"\x13", b"\x11", PROMPT, b"E")
+
+Arguments = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Far:
+    """What a trouble is done to."""
+
+    drive: SimulatedDrive
+    line: TroubledLine
+
+
+@dataclass(frozen=True, slots=True)
+class TroubleKind:
+    """One kind of trouble."""
+
+    weight: float
+    draw: Callable[[Random], Arguments]
+    do: Callable[[Far, Trouble], Awaitable[None]]
+    reconnecting: float = 0.0
+    """What is added to the weight where the client opens a lost line again."""
+    forges: bool = False
+    """It may turn what one end says into something else that makes sense to the other."""
+
+
+async def befall(trouble: Trouble, far: Far) -> None:
+    """Do it, and take it back when it is over."""
+    far.line.note(f"{trouble.kind} begins")
+    await TROUBLES[trouble.kind].do(far, trouble)
+    far.line.note(f"{trouble.kind} is over")
+
+
+# The line ---------------------------------------------------------------------------------------------------------
+
+
+def _draw_tamper(random: Random) -> Arguments:
+    kind = random.choice(("lose", "lose", "garble", "double", "cut"))
+    return {
+        "direction": random.choice(("to_drive", "to_host")),
+        "kind": kind,
+        "skip": random.choice((0, 0, 1, 2, 3, 4, 5, 8, 12, 20, 40)),
+        "count": random.choice((1, 1, 2, 3, 7, 20)),
+    }
+
+
+async def _tamper(far: Far, trouble: Trouble) -> None:
+    far.line.add(Tamper(**trouble.arguments))
+
+
+async def _lose_end(far: Far, _: Trouble) -> None:
+    far.line.add(Tamper("to_drive", "lose_end"))
+
+
+async def _slow_line(far: Far, trouble: Trouble) -> None:
+    direction = trouble.arguments["direction"]
+    far.line.delay_s[direction] = trouble.arguments["delay_s"]
+    await asyncio.sleep(trouble.lasts_s)
+    far.line.delay_s[direction] = 0.0
+
+
+async def _pieces(far: Far, trouble: Trouble) -> None:
+    far.line.piece = trouble.arguments["size"]
+    await asyncio.sleep(trouble.lasts_s)
+    far.line.piece = None
+
+
+async def _repeat(far: Far, _: Trouble) -> None:
+    far.line.repeat()
+
+
+async def _hold(far: Far, trouble: Trouble) -> None:
+    far.line.hold(held=True)
+    await asyncio.sleep(trouble.lasts_s)
+    far.line.hold(held=False)
+
+
+async def _cut(far: Far, trouble: Trouble) -> None:
+    far.line.refused = True
+    far.line.cut()
+    await asyncio.sleep(trouble.lasts_s)
+    far.line.refused = False
+
+
+async def _half_open(far: Far, trouble: Trouble) -> None:
+    far.line.vanishing = True
+    await asyncio.sleep(trouble.lasts_s)
+    far.line.vanishing = False
+
+
+async def _stranger(far: Far, trouble: Trouble) -> None:
+    far.line.exchange_device(SimulatedDrive(Knobs(position=trouble.arguments["position"]), name="stranger"))
+    far.line.cut()
+    await asyncio.sleep(trouble.lasts_s)
+    far.line.exchange_device(far.drive)
+    far.line.cut()
+
+
+async def _other_host(far: Far, trouble: Trouble) -> None:
+    far.line.from_elsewhere(trouble.arguments["data"])
+
+
+# The drive --------------------------------------------------------------------------------------------------------
+
+
+async def _silent(far: Far, trouble: Trouble) -> None:
+    far.drive.silent = True
+    await asyncio.sleep(trouble.lasts_s)
+    far.drive.silent = False
+
+
+async def _deaf(far: Far, trouble: Trouble) -> None:
+    far.drive.deaf = True
+    await asyncio.sleep(trouble.lasts_s)
+    far.drive.deaf = False
+
+
+async def _slow(far: Far, trouble: Trouble) -> None:
+    far.drive.extra_answer_delay_s = trouble.arguments["delay_s"]
+    await asyncio.sleep(trouble.lasts_s)
+    far.drive.extra_answer_delay_s = 0.0
+
+
+async def _lose_answers(far: Far, trouble: Trouble) -> None:
+    far.drive.lose_answers += trouble.arguments["count"]
+
+
+async def _lose_message(far: Far, _: Trouble) -> None:
+    far.drive.lose_position_reached += 1
+
+
+async def _late_message(far: Far, trouble: Trouble) -> None:
+    far.drive.delay_position_reached_s = trouble.arguments["delay_s"]
+    await asyncio.sleep(trouble.lasts_s)
+    far.drive.delay_position_reached_s = 0.0
+
+
+async def _fault(far: Far, trouble: Trouble) -> None:
+    far.drive.raise_fault(trouble.arguments["code"])
+
+
+async def _power(far: Far, trouble: Trouble) -> None:
+    far.drive.power_off()
+    await asyncio.sleep(trouble.lasts_s)
+    far.drive.power_on()
+
+
+async def _noise(far: Far, trouble: Trouble) -> None:
+    far.drive.inject(trouble.arguments["data"])
+
+
+async def _flood(far: Far, trouble: Trouble) -> None:
+    for _ in range(trouble.arguments["pieces"]):
+        far.drive.inject(trouble.arguments["data"] * 100)
+        await asyncio.sleep(0.002)
+
+
+async def _panel(far: Far, _: Trouble) -> None:
+    drive = far.drive
+    with suppress(RefusedError):  # its answer is not on this line
+        drive._machine.execute(MoveTo(PANEL_TARGET), False, asyncio.get_running_loop().time())  # noqa: SLF001
+    far.line.note("moved at its panel")
+    if drive.served_by is not None:
+        drive.served_by.changed()
+
+
+async def _stall(_: Far, trouble: Trouble) -> None:
+    loop = asyncio.get_running_loop()
+    assert isinstance(loop, VirtualClockLoop)
+    loop.jump(trouble.arguments["stall_s"])
+
+
+def _nothing(_: Random) -> Arguments:
+    return {}
+
+
+def _one_of(**choices: tuple[Any, ...]) -> Callable[[Random], Arguments]:
+    return lambda random: {name: random.choice(values) for name, values in choices.items()}
+
+
+_DELAYS_S: Final = (0.001, 0.01, 0.05, 0.25, 0.31, 0.35, 0.8)
+
+TROUBLES: Final[Mapping[str, TroubleKind]] = {
+    "tamper": TroubleKind(6, _draw_tamper, _tamper, forges=True),
+    "lose end": TroubleKind(1.5, _nothing, _lose_end),
+    "slow line": TroubleKind(3, _one_of(direction=("to_drive", "to_host"), delay_s=_DELAYS_S), _slow_line),
+    "pieces": TroubleKind(2, _one_of(size=(1, 2, 3, 5)), _pieces),
+    "repeat": TroubleKind(1.5, _nothing, _repeat, forges=True),
+    "hold": TroubleKind(1.5, _nothing, _hold),
+    "cut": TroubleKind(2, _nothing, _cut, reconnecting=2),
+    "half open": TroubleKind(1, _nothing, _half_open, reconnecting=1),
+    "stranger": TroubleKind(0, _one_of(position=(0.0, 4321.0)), _stranger, reconnecting=1),
+    "other host": TroubleKind(1, _one_of(data=_HALF_LINES), _other_host, forges=True),
+    "silent": TroubleKind(2, _nothing, _silent),
+    "deaf": TroubleKind(2, _nothing, _deaf),
+    "slow": TroubleKind(3, _one_of(delay_s=_DELAYS_S), _slow),
+    "lose answers": TroubleKind(3, _one_of(count=(1, 1, 2, 3)), _lose_answers),
+    "lose message": TroubleKind(1.5, _nothing, _lose_message),
+    "late message": TroubleKind(1.5, _one_of(delay_s=_DELAYS_S), _late_message),
+    "fault": TroubleKind(1.5, _one_of(code=(20, 55, 53, 70)), _fault),
+    "power": TroubleKind(1, _nothing, _power),
+    "noise": TroubleKind(1.5, _one_of(data=_NOISE), _noise, forges=True),
+    "flood": TroubleKind(0.3, _one_of(pieces=(3, 20, 300), data=(b"\x55", b"S001", b"\r\n")), _flood, forges=True),
+    "panel": TroubleKind(0.7, _nothing, _panel),
+    "stall": TroubleKind(1, _one_of(stall_s=(0.01, 0.2, 0.5, 3.0)), _stall),
+}
+"""By name. What forges may excuse that a value, or a motion, is not what its sender meant."""
