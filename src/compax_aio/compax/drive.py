@@ -10,7 +10,7 @@ from typing import Self, Unpack
 
 from ..errors import ConnectionLostError, InvalidCommandError
 from ..link.cancellation import despite_cancellation
-from ..link.contract import Event, Lane
+from ..link.contract import Event
 from ..link.link import LinkStats
 from ..link.reconnecting import Restored
 from .axis import AxisCommands
@@ -82,9 +82,8 @@ class Drive(Readings, AxisCommands):
             on_restored=self._on_restored,
         )
         super().__init__(line, Observer(line, self._on_fault))
-        self._identity = Identity(line)
-        self._signs_of_restart: dict[str, None] = {}
         self._motion = Motion(self._observer)
+        self._identity = Identity(self._observer, self._motion)
         self.parameters = Parameters(line)
         self.variables = NumberedValues(line, VARIABLE_TABLE)
         self.program = ProgramMemory(self._observer, self._motion)
@@ -94,15 +93,7 @@ class Drive(Readings, AxisCommands):
         await self._line.link.open(url)
 
     async def _greet(self) -> None:
-        """Look who is there and how it stands, before anything that can move is sent."""
-        signs = self._signs_of_restart  # those of a greeting that was cut count, too
-        if self.settings.reconnect and await self._identity.check():
-            signs["the error history has a new power-on mark (S18)"] = None
-        was_homed, is_homing = self._observer.is_homed, self._motion.is_homing
-        status = await self._motion.look_around()
-        if status is not None and was_homed and not status.machine_zero_approached and not is_homing:
-            signs["machine zero is not approached any more (S16 bit 3)"] = None
-        await self._line.transfer.read_interface(Lane.GREETING)
+        await self._identity.greet()
 
     def __repr__(self) -> str:
         return f"<Drive {self.name} {'open' if self.is_open else 'closed'}>"
@@ -394,7 +385,7 @@ class Drive(Readings, AxisCommands):
         self._motion.line_lost(error)
 
     def _on_restored(self, restored: Restored) -> None:
-        signs, self._signs_of_restart = tuple(self._signs_of_restart), {}
+        signs = self._identity.take_signs_of_restart()
         if signs:
             _log.warning(
                 "%s seems to have been switched off and on: %s; prepared points, SPEED, ramps and the position "

@@ -9,7 +9,8 @@ from ..errors import AnswerTimeoutError, CommandRejectedError, UnexpectedAnswerE
 from ..link.contract import Lane
 from .codecs import decode_codes, value_text
 from .facts.device_errors import HISTORY_POWERED_ON
-from .line import DriveLine
+from .motion import Motion
+from .observer import Observer
 
 __all__ = ["Identity", "has_power_on_mark"]
 
@@ -24,25 +25,41 @@ class Identity:
     What a drive says of itself, remembered from the first time to the next.
 
     Args:
-        line: Of the drive.
+        observer: Of the drive.
+        motion: Of the same drive.
     """
 
-    def __init__(self, line: DriveLine) -> None:
-        self._line = line
+    def __init__(self, observer: Observer, motion: Motion) -> None:
+        self._line = observer.line
+        self._observer = observer
+        self._motion = motion
         self._values: dict[int, str] | None = None
         self._history: tuple[int, ...] | None = None
+        self._signs_of_restart: dict[str, None] = {}
 
-    async def check(self) -> bool:
+    async def greet(self) -> None:
         """
-        Look who is there, ahead of all else; the first time, remember it.
-
-        Returns:
-            Whether the error history shows that the drive was switched off and on since the last time.
+        Look who is there and how it stands, on a line that was opened; the first time, remember it.
 
         Raises:
             UnexpectedAnswerError: It is another drive.
             AnswerTimeoutError, ConnectionLostError: It does not say.
         """
+        if self._line.settings.reconnect and await self._check():
+            self._signs_of_restart["the error history has a new power-on mark (S18)"] = None
+        was_homed, is_homing = self._observer.is_homed, self._motion.is_homing
+        status = await self._motion.look_around()
+        if status is not None and was_homed and not status.machine_zero_approached and not is_homing:
+            self._signs_of_restart["machine zero is not approached any more (S16 bit 3)"] = None
+        await self._line.transfer.read_interface(Lane.GREETING)
+
+    def take_signs_of_restart(self) -> tuple[str, ...]:
+        """Take what has shown since the last time that the drive was switched off, in greetings that were cut too."""
+        signs, self._signs_of_restart = tuple(self._signs_of_restart), {}
+        return signs
+
+    async def _check(self) -> bool:
+        """Raise unless it is the drive of the last time; return whether it has a new mark of power-on."""
         if self._values is None:
             self._values = await self._learn()
         else:

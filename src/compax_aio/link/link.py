@@ -289,11 +289,6 @@ class Link(asyncio.Protocol):
         """Return the last exchanges of this line, oldest first, readable."""
         return self.history.lines()
 
-    def check_whether_lost(self) -> None:
-        """Raise ConnectionLostError if there is no line now; it may come back."""
-        if self.is_over or not (self._port.is_there or self._is_renewing):
-            raise self._lost(None)
-
     # What asyncio calls ---------------------------------------------------------------------------------------------
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
