@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from typing import Final
 
 from ..errors import AnswerTimeoutError, CommandRejectedError, CompaxError, ConnectionLostError, MoveTimeoutError
@@ -14,6 +15,9 @@ __all__ = ["Stop"]
 
 _PAUSE_S: Final = 0.1
 
+_log = logging.getLogger("compax_aio.compax")
+
+_HINT_WHEN_LOST: Final = "the axis may be moving: use the emergency stop"
 _HINT: Final = (
     "the axis may be moving: use the emergency stop; the RS-232 word for STOP is on no page that was available "
     "(DriveSettings.dialect), so try it on a bench first"
@@ -64,6 +68,7 @@ class Stop:
     async def _until_acknowledged(self) -> None:
         """Repeat STOP until the drive acknowledges it: it does no harm when it comes twice."""
         give_up_at = self._loop.time() + self._settings.stop_timeout_s
+        self._warn_if_lost()
         while True:
             try:
                 outcome = await self._answer(give_up_at)
@@ -78,12 +83,25 @@ class Stop:
                 if isinstance(failure, CommandRejectedError) and await self._has_nothing_to_stop():
                     return
             if self._loop.time() >= give_up_at:
-                failure.what = f"STOP was not acknowledged: {failure.what}"
-                if self._observer.line.link.held is None:
-                    failure.hint = _HINT
-                raise failure
+                raise self._told(failure)
             await asyncio.sleep(_PAUSE_S)
             self._reply = self._send()
+
+    def _warn_if_lost(self) -> None:
+        if not self._observer.line.link.is_open:
+            _log.warning(
+                "%s: STOP waits for the line, which is lost, at most %g s; use the emergency stop if that is too long",
+                self._observer.line.name,
+                self._settings.stop_timeout_s,
+            )
+
+    def _told(self, failure: CompaxError) -> CompaxError:
+        failure.what = f"STOP was not acknowledged: {failure.what}"
+        if isinstance(failure, ConnectionLostError):
+            failure.hint = _HINT_WHEN_LOST
+        elif self._observer.line.link.held is None:
+            failure.hint = _HINT
+        return failure
 
     async def _answer(self, give_up_at: float) -> TurnOver:
         """Await the answer to STOP; while the line is lost, no longer than until *give_up_at*."""
@@ -94,7 +112,6 @@ class Stop:
             raise ConnectionLostError(
                 "the line is lost",
                 device=self._observer.line.name,
-                hint=_HINT,
                 exchanges=link.recent(),
             )
         return await self._reply
