@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from contextlib import suppress
 
 from ..errors import (
     AnswerTimeoutError,
@@ -18,6 +19,7 @@ from ..errors import (
 )
 from ..link.contract import Lane
 from .codecs import DriveStatus
+from .facts.device_errors import DeviceError
 from .memory import Memory
 from .moves import Move, OnCancel, PreparedMove, check_manner, fetch_error
 from .observer import Observer
@@ -48,6 +50,7 @@ class Motion:
         self._loop = asyncio.get_running_loop()
         self._memory = Memory()
         self._active: Pursuit | None = None
+        self._stopped: Pursuit | None = None
         self._task: asyncio.Task[None] | None = None
         self._stopping: asyncio.Task[None] | None = None
         self.stops = 0
@@ -159,7 +162,7 @@ class Motion:
     async def _pursue(self, pursuit: Pursuit) -> None:
         try:
             if self._stopping is not None:
-                await asyncio.wait([self._stopping])
+                await self._until_stopped(pursuit.times_opened)
                 self._refuse_in_doubt(pursuit.move.plan.description)
             await pursuit.carry_out()
         except MoveTimeoutError as error:
@@ -179,6 +182,14 @@ class Motion:
             if self._stopping is not None:
                 await asyncio.wait([self._stopping])
             raise
+
+    async def _until_stopped(self, times_opened: int) -> None:
+        """Wait for a stop that is under way; what shall follow it is not said on a line that came back meanwhile."""
+        assert self._stopping is not None
+        link = self._observer.line.link
+        link.check_not_lost(times_opened)
+        await asyncio.wait([self._stopping])
+        link.check_not_lost(times_opened)
 
     async def command(self, text: str) -> None:
         """Send *text* as :meth:`tell` does; where nobody can say what became of it, no motion is taken any more."""
@@ -208,12 +219,13 @@ class Motion:
         """
         stops = self.stops if unless_stopped_since is None else unless_stopped_since
         if self._stopping is not None:
-            await asyncio.wait([self._stopping])
+            await self._until_stopped(self._observer.line.link.times_opened)
         self.refuse_second(repr(text))
         self._refuse_in_doubt(repr(text))
         await self._observer.line.transfer.say_settings(())
         if self.stops != stops:
             raise self._reports.taken_back(text)
+        self._observer.is_homed = False  # what nobody watches may be a search for machine zero
         await self.untracked.tell(text)
 
     def note_doubt(self, why: str) -> None:
@@ -278,8 +290,9 @@ class Motion:
         """Let a move that is under way find its fate; before the next, settings are said again."""
         self._observer.line.transfer.forget_taken()
         self.restarts += bool(signs_of_restart)
-        if self._active is not None:
-            self._active.line_restored(signs_of_restart)
+        for pursuit in (self._active, self._stopped):
+            if pursuit is not None:
+                pursuit.line_restored(signs_of_restart)
 
     @property
     def is_homing(self) -> bool:
@@ -335,6 +348,7 @@ class Motion:
         if self._stopping is None:
             self.untracked.note_over(self.untracked.mark())
             stop = Stop(self._observer)
+            self._stopped = pursuit
             self._stopping = self._loop.create_task(self._stop(stop, pursuit, reason), name=f"{self.name}: stop")
             self._stopping.add_done_callback(self._stop_done)
         return self._stopping
@@ -342,7 +356,7 @@ class Motion:
     async def _stop(self, stop: Stop, pursuit: Pursuit | None, reason: MoveError | None) -> None:
         try:
             look = await stop.carry_through()
-            fault = None if look.status.no_fault else await self._observer.read_error()
+            fault = None if look.status.no_fault else await self._read_fault()
         except CompaxError as error:
             self._memory.doubt = f"a stop failed ({error.what})"
             self.untracked.note()
@@ -354,6 +368,13 @@ class Motion:
             pursuit.conclude_stopped(
                 look, None if look.status.no_fault else self._reports.fault(move, look, fault), reason
             )
+
+    async def _read_fault(self) -> DeviceError | None:
+        """Read S30 of a drive that stands; which fault it is does not hold up who waits for the stop."""
+        with suppress(TimeoutError, ConnectionLostError):
+            async with asyncio.timeout(self._observer.line.settings.answer_timeout_s):
+                return await self._observer.read_error()
+        return None
 
     async def stop(self) -> None:
         """Stop the drive and return at its standstill."""
@@ -367,7 +388,7 @@ class Motion:
             await asyncio.shield(self._stopping)
 
     def _stop_done(self, task: asyncio.Task[None]) -> None:
-        self._stopping = None
+        self._stopping = self._stopped = None
         if not task.cancelled() and (error := task.exception()) is not None:
             _log.error("%s", error)
 

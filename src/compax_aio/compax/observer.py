@@ -52,7 +52,7 @@ class Observer:
         """Read S16 and S17; a fault they show is told to whoever follows the drive's events."""
         status = await self.line.status(lane)
         self.is_homed = status.machine_zero_approached
-        await self.note(no_fault=status.no_fault, lane=Lane.GREETING if lane is Lane.GREETING else Lane.CONTROL)
+        await self.note(no_fault=status.no_fault, lane=Lane.CONTROL if lane is Lane.READ else lane)
         return status
 
     async def note(self, *, no_fault: bool, lane: Lane = Lane.CONTROL) -> None:

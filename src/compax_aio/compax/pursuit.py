@@ -65,6 +65,8 @@ class Pursuit:
         self.move = move
         self._observer = observer
         self._line = observer.line
+        self.times_opened = observer.line.link.times_opened
+        """When the move was commanded."""
         self._settings = observer.line.settings
         self._memory = memory
         self._reports = Reports(observer.line.name, observer)

@@ -80,7 +80,7 @@ class Stop:
                 if isinstance(outcome, Acknowledged):
                     return
                 failure = self._observer.line.error_of(self._settings.dialect.stop, outcome)
-                if isinstance(failure, CommandRejectedError) and await self._has_nothing_to_stop():
+                if isinstance(failure, CommandRejectedError) and await self._has_nothing_to_stop(give_up_at):
                     return
             if self._loop.time() >= give_up_at:
                 raise self._told(failure)
@@ -107,7 +107,9 @@ class Stop:
         """Await the answer to STOP; while the line is lost, no longer than until *give_up_at*."""
         link = self._observer.line.link
         await asyncio.wait([self._reply], timeout=max(give_up_at - self._loop.time(), 0.0))
-        if not self._reply.done() and not link.is_open:
+        while not self._reply.done() and link.is_open:  # its last answer is on the way, or the line is lost meanwhile
+            await asyncio.wait([self._reply], timeout=_PAUSE_S)
+        if not self._reply.done():
             self._reply.cancel()
             raise ConnectionLostError(
                 "the line is lost",
@@ -116,9 +118,12 @@ class Stop:
             )
         return await self._reply
 
-    async def _has_nothing_to_stop(self) -> bool:
+    async def _has_nothing_to_stop(self, give_up_at: float) -> bool:
         try:
-            status = await self._observer.read_status()
+            async with asyncio.timeout_at(max(give_up_at, self._loop.time() + self._settings.answer_timeout_s)):
+                status = await self._observer.read_status()
+        except TimeoutError:
+            return False
         except CompaxError:
             if self._observer.line.link.is_over:
                 raise

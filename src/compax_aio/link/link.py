@@ -142,7 +142,8 @@ class Link(asyncio.Protocol):
         in_step = self._turns.until_in_step()
         in_step.add_done_callback(lambda each: each.cancelled() or each.exception())  # if the opener fails, nobody asks
         try:
-            await open_transport(self._url, self._take_end)
+            async with asyncio.timeout(self._opening_s):
+                await open_transport(self._url, self._take_end)
         except BaseException:
             in_step.cancel()
             raise
@@ -151,6 +152,11 @@ class Link(asyncio.Protocol):
             await self._greet()
         if not self._port.is_there:  # lost in one breath with the last answer
             raise self._lost(None)
+
+    @property
+    def _opening_s(self) -> float | None:
+        """How long an opener may take to get a lost line back; the first time it is the caller who waits."""
+        return self._reconnecting.patience_s if self._reconnecting is not None and self._attempts > 1 else None
 
     def _take_end(self) -> _End:
         if self._end is not None:
@@ -219,6 +225,16 @@ class Link(asyncio.Protocol):
         return self._turns.lines_sent
 
     @property
+    def times_opened(self) -> int:
+        """How often the line has been opened, or tried to: tell it to :meth:`check_not_lost` later."""
+        return self._attempts
+
+    def check_not_lost(self, since: int) -> None:
+        """Raise ConnectionLostError if there is no line, or another one than when it was opened *since* times."""
+        if self.is_over or not self._port.is_there or self._attempts != since:
+            raise self._lost(None)
+
+    @property
     def is_free(self) -> bool:
         """Whether a line that is queued now would be written at once, unless it is a read that is held back."""
         return self.is_open and self._turns.is_free
@@ -260,16 +276,18 @@ class Link(asyncio.Protocol):
         exchange = Exchange(
             text, lane, settles_late, survives_loss, self._attempts, self._loop.time(), on_sent, [waiter]
         )
+        if self._silence is not None and not self.is_over:
+            if lane is Lane.STOP:
+                self._turns.say_ahead(exchange)  # it may be heard, although nothing comes back
+            self._renew(self._silence)
         if not self._takes(exchange):
             waiter.set_exception(self._lost(exchange))
             return waiter
-        if self._silence is not None:
-            self._renew(self._silence)
         self._turns.put(exchange)
         return waiter
 
     def _takes(self, exchange: Exchange) -> bool:
-        if self.is_over or self._port.is_there or self._is_renewing:
+        if self.is_over or self._port.is_there:
             return not self.is_over
         return exchange.survives_loss and self._reconnecting is not None
 
@@ -356,7 +374,10 @@ class Link(asyncio.Protocol):
         self._silence = None
         self._is_renewing = True
         self._turns.queue.is_admitted = False
-        self._port.hang_up()
+        if self._port.is_stuck:
+            self._port.hang_up()
+        else:
+            self._port.let_go()
         self._reconnecting.begin(self, self._lost(None, silence), at_once=True)
 
     def _lost(self, exchange: Exchange | None, cause: Exception | None = None) -> ConnectionLostError:

@@ -106,15 +106,23 @@ class Port:
         del self._unread[:_PIECE_BYTES]
         if self._unread:
             self._loop.call_later(_BETWEEN_PIECES_S, self._read_piece, transport, read)
-        else:
-            transport.resume_reading()
         read(piece)
+        if not self._unread and transport is self._transport:
+            transport.resume_reading()
 
     def hang_up(self) -> None:
         """Let go of the transport at once; it reports its end soon."""
         transport, self._transport = self._transport, None
         if transport is not None:
             transport.abort()
+
+    def let_go(self) -> None:
+        """Let go of the transport when it has sent what waits, within half a second; it reports its end then."""
+        transport, self._transport = self._transport, None
+        end = self._end
+        if transport is not None and end is not None:
+            transport.close()
+            self._loop.call_later(_CLOSE_GRACE_S, _abort_unless_ended, transport, end)
 
     async def close(self) -> bool:
         """Send what waits, and let go of the transport; False if it has not reported its end within a second or so."""
@@ -132,3 +140,9 @@ class Port:
             return True
         _log.error("%s: the transport did not report its end", self._name)
         return False
+
+
+def _abort_unless_ended(transport: asyncio.Transport, end: asyncio.Future[None]) -> None:
+    # After its end, asyncio's own transports of CPython 3.11 do not bear it.
+    if not end.done():
+        transport.abort()

@@ -101,6 +101,7 @@ class Reconnecting:
         self._random = Random(repr(name))
         self._pauses_s = backoff.pauses_s(self._random)
         self._restored_at = self._loop.time()
+        self._is_over = False
         self._task: asyncio.Task[None] | None = None
         self._timer: asyncio.TimerHandle | None = None
 
@@ -119,6 +120,7 @@ class Reconnecting:
 
     async def end(self) -> None:
         """Try no more."""
+        self._is_over = True
         self._relax()
         task, self._task = self._task, None
         if task is not None and not task.done():
@@ -130,7 +132,7 @@ class Reconnecting:
         self._on_down(loss)
         error: CompaxError = loss
         attempts = 0
-        while self._backoff.attempts is None or attempts < self._backoff.attempts:
+        while not self._is_over and (self._backoff.attempts is None or attempts < self._backoff.attempts):
             pause_s = next(self._pauses_s)
             await asyncio.sleep(0 if at_once and not attempts else pause_s)
             attempts += 1
@@ -146,7 +148,8 @@ class Reconnecting:
             error = failure
             self._log.tell(logging.WARNING, "the line is still lost: %s", error.what)
         self._relax()
-        line.give_up(error)
+        if not self._is_over:
+            line.give_up(error)
 
     async def _attempt(self, line: LostLine) -> CompaxError | None:
         """Open the line once; return why it could not be, whatever a transport of somebody else raises."""

@@ -99,6 +99,12 @@ class Turns:
         self._ensure_doubt_is_pursued()
         self.pump()
 
+    def say_ahead(self, stop: Exchange) -> None:
+        """Write *stop*, which waits for the next line, on one that is about to be let go of."""
+        if self._port.is_there and self._protocol.in_doubt and not self._protocol.is_busy and not self._port.is_stuck:
+            self._send_ahead(stop)
+            self._flush()
+
     def until_in_step(self) -> asyncio.Future[None]:
         """Return a future that is done when the line is in step, or fails with all else that waits."""
         self._in_step = self._loop.create_future()
