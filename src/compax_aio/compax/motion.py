@@ -11,7 +11,6 @@ from ..errors import (
     CommandRejectedError,
     CompaxError,
     ConnectionLostError,
-    MoveActiveError,
     MoveError,
     MoveInDoubtError,
     MoveTimeoutError,
@@ -66,18 +65,9 @@ class Motion:
         self.refuse_second(plan.description)
         self._refuse_in_doubt(plan.description)
         if self._observer.line.transfer.speed_is_unknown and not plan.sets_speed and not plan.finds_machine_zero:
-            raise MoveError(
-                f"{plan.description} was not sent: a binary motion was cut, and may have changed the speed in force",
-                device=self.name,
-                hint="give the move its speed_percent",
-            )
+            raise self._reports.speed_unknown(plan)
         if self._memory.points_prepared and not plan.finds_machine_zero:
-            raise MoveError(
-                f"{plan.description} was not sent: the drive still holds {self._memory.points_prepared} speed steps or "
-                "comparators of a move that was not started, and they would act on this one",
-                device=self.name,
-                hint="home() cancels them (UG p. 101)",
-            )
+            raise self._reports.points_left(plan, self._memory.points_prepared)
 
     def start(self, plan: MovePlan, timeout_s: float | None, on_cancel: OnCancel) -> Move:
         """
@@ -108,11 +98,7 @@ class Motion:
     def trigger(self, move: PreparedMove) -> None:
         """Start *move*, which the drive must hold ready."""
         if not self._is_active(move) or not move.readiness.done() or move.triggered.is_set():
-            is_too_late = move.readiness.done()
-            why = "it has been triggered or has ended" if is_too_late else "the drive does not hold it ready yet"
-            raise MoveError(
-                f"{move.plan.description} was not triggered: {why}", device=self.name, hint="await move.ready before"
-            )
+            raise self._reports.not_ready(move)
         move.triggered.set()
         self._limit(move, self._timeout_s)
 
@@ -236,19 +222,11 @@ class Motion:
     def refuse_second(self, what: str) -> None:
         """Raise MoveActiveError if a move runs: *what* was not sent."""
         if self._active is not None and not self._active.move.done():
-            raise MoveActiveError(
-                f"{self._active.move.plan.description} is running, so {what} was not sent",
-                device=self.name,
-                hint="await it or stop it first; the drive would answer E92 (UG p. 162, 209)",
-            )
+            raise self._reports.running(self._active.move, what)
 
     def _refuse_in_doubt(self, what: str) -> None:
         if self._memory.doubt is not None:
-            raise MoveInDoubtError(
-                f"{what} was not sent, for {self._memory.doubt}",
-                device=self.name,
-                hint="look at the machine, then call reconcile()",
-            )
+            raise self._reports.refused_in_doubt(what, self._memory.doubt)
 
     def _time_is_up(self, move: Move, timeout_s: float) -> None:
         error = self._reports.out_of_time(move, timeout_s)

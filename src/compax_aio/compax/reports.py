@@ -7,13 +7,15 @@ from ..errors import (
     ConnectionLostError,
     DriveFaultError,
     MoveActiveError,
+    MoveError,
     MoveInDoubtError,
     MoveStoppedError,
     MoveTimeoutError,
 )
 from .facts.device_errors import DeviceError
-from .moves import Move
+from .moves import Move, PreparedMove
 from .observer import Look, Observer
+from .vocabulary import MovePlan
 
 __all__ = ["Reports"]
 
@@ -24,6 +26,45 @@ class Reports:
     def __init__(self, name: str, observer: Observer) -> None:
         self._name = name
         self._observer = observer
+
+    def speed_unknown(self, plan: MovePlan) -> MoveError:
+        """Report a move that names no speed, where nobody knows the one in force."""
+        return MoveError(
+            f"{plan.description} was not sent: a binary motion was cut, and may have changed the speed in force",
+            device=self._name,
+            hint="give the move its speed_percent",
+        )
+
+    def points_left(self, plan: MovePlan, points: int) -> MoveError:
+        """Report a move on which speed steps or comparators of an earlier one would act."""
+        return MoveError(
+            f"{plan.description} was not sent: the drive still holds {points} speed steps or comparators of a move "
+            "that was not started, and they would act on this one",
+            device=self._name,
+            hint="home() cancels them (UG p. 101)",
+        )
+
+    def running(self, move: Move, what: str) -> MoveActiveError:
+        """Report what was not sent because *move* runs."""
+        return MoveActiveError(
+            f"{move.plan.description} is running, so {what} was not sent",
+            device=self._name,
+            hint="await it or stop it first; the drive would answer E92 (UG p. 162, 209)",
+        )
+
+    def refused_in_doubt(self, what: str, doubt: str) -> MoveInDoubtError:
+        """Report what was not sent because something before it is in doubt."""
+        return MoveInDoubtError(
+            f"{what} was not sent, for {doubt}", device=self._name, hint="look at the machine, then call reconcile()"
+        )
+
+    def not_ready(self, move: PreparedMove) -> MoveError:
+        """Report a move that cannot be triggered."""
+        is_too_late = move.readiness.done()
+        why = "it has been triggered or has ended" if is_too_late else "the drive does not hold it ready yet"
+        return MoveError(
+            f"{move.plan.description} was not triggered: {why}", device=self._name, hint="await move.ready before"
+        )
 
     def withdrawn(self, move: Move) -> MoveStoppedError:
         """Report a move that was stopped before its motion was sent."""
