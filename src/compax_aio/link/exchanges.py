@@ -37,7 +37,7 @@ class Exchange:
     is_late: bool = False
     """Whether it was sent in its turn, and its time has run out."""
     is_on_wire: bool = False
-    """Whether it was sent in its turn."""
+    """Whether it was sent in its turn, on this line or an earlier one."""
     received: str | None = None
     """What had come until then."""
     _crowded_at: int = _CROWD
@@ -55,8 +55,8 @@ class Exchange:
         self.waiters += waiters
 
     def begin_anew(self) -> None:
-        """Forget that it was sent: the line on which it was is lost."""
-        self.is_on_wire = self.is_late = False
+        """Wait for another line, for the one on which it was is lost."""
+        self.is_late = False
         self.received = None
 
     def end(self, outcome: TurnOver) -> None:

@@ -113,7 +113,6 @@ class Link(asyncio.Protocol):
         self._url = ""
         self._is_closing = self._is_lost = False
         self._silence: AnswerTimeoutError | None = None
-        self._is_renewing = False
         self._attempts = 0
         self._end: _End | None = None
 
@@ -193,7 +192,6 @@ class Link(asyncio.Protocol):
         """Open the line again, once; raises CompaxError, with nothing left open, if that fails."""
         try:
             await self._close_port()
-            self._is_renewing = False
             await self._connect()
         except BaseException as error:
             if isinstance(error, CompaxError) and not isinstance(error, TransportError):
@@ -330,8 +328,6 @@ class Link(asyncio.Protocol):
         self._port.ended()
         self._silence = None
         self._turns.line_lost()
-        if self._is_renewing:
-            return
         was_admitted, self._turns.queue.is_admitted = self._turns.queue.is_admitted, False
         self._fail_what_tells(exc)
         if self._is_closing or not was_admitted:
@@ -372,7 +368,6 @@ class Link(asyncio.Protocol):
     def _renew(self, silence: AnswerTimeoutError) -> None:
         assert self._reconnecting is not None
         self._silence = None
-        self._is_renewing = True
         self._turns.queue.is_admitted = False
         if self._port.is_stuck:
             self._port.hang_up()
