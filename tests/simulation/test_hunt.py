@@ -3,29 +3,22 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 
 import pytest
 
 from compax_aio.simulator.hunt.drawing import draw_scenario
 from compax_aio.simulator.hunt.hunting import Hunt
 from compax_aio.simulator.hunt.promises import broken
+from compax_aio.simulator.hunt.scenario_file import read_scenario
 from compax_aio.simulator.hunt.simulation import simulate
 from compax_aio.simulator.hunt.story import story
 
 SEEDS = int(os.environ.get("HUNT_SEEDS", "2000"))
 PIECES = 20
 
-REGRESSIONS: tuple[tuple[int, tuple[int, ...] | None, str], ...] = (
-    (38, None, "the line is cut while a block that is left waits for its STOP"),
-    (284, None, "a stop comes while another one waits between two looks"),
-    (725, None, "a stop joins one that a deaf drive has not acknowledged"),
-    (962, None, "a group is stopped, and one of its lines is cut meanwhile"),
-    (1461, None, "a stop comes while the last marker is out"),
-    (2261, None, "a flood without a prompt, and a stop in it"),
-    (3054, None, "a flood without a prompt swallows the first answer after it"),
-    (7775, None, "somebody begins to watch what is being asked already"),
-)
-"""Seeds, parts that are kept (None: all), and what they are about: each has once found something, here or there."""
+REGRESSIONS = sorted((Path(__file__).parent / "regressions").glob("*.json"))
+"""Scenarios that have each once found something, here or there; told apart by what they are about."""
 
 
 @pytest.mark.parametrize("piece", range(PIECES))
@@ -38,10 +31,10 @@ def test_whatever_users_do_and_whatever_befalls_lines_and_drives_no_promise_is_b
     )
 
 
-@pytest.mark.parametrize(("seed", "keep", "about"), REGRESSIONS, ids=[about for *_, about in REGRESSIONS])
-def test_what_was_found_once_stays_mended(seed: int, keep: tuple[int, ...] | None, about: str) -> None:
-    scenario = draw_scenario(seed)
-    testimony = simulate(scenario if keep is None else scenario.keep(keep))
+@pytest.mark.parametrize("path", REGRESSIONS, ids=[path.stem.replace("_", " ") for path in REGRESSIONS])
+def test_what_was_found_once_stays_mended(path: Path) -> None:
+    _, scenario = read_scenario(path)
+    testimony = simulate(scenario)
     found = broken(testimony)
     assert not found, story(testimony, found)
 

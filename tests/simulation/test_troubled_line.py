@@ -167,3 +167,17 @@ async def test_after_a_cut_another_device_may_be_at_the_far_end(bench: Bench) ->
     await asyncio.sleep(0)
     assert bench.host.is_lost
     assert await bench.say(b"S1\r") == b"S001: 4321.00\r\n>"
+
+
+async def test_a_flipped_byte_is_another_digit(bench: Bench) -> None:
+    bench.line.add(Tamper("to_drive", "flip", skip=1, count=1))
+    assert await bench.say(b"S4\r") == b"S005: 0.00\r\n>"
+
+
+async def test_a_device_server_that_keeps_what_nobody_has_heard_tells_it_to_who_connects_next(bench: Bench) -> None:
+    await bench.say(b"S1\r")
+    bench.line.keeps = True
+    bench.line.cut()
+    bench.drive.inject(b"$\r\n>")
+    await asyncio.sleep(0.1)
+    assert await bench.say(b"S1\r") == b"$\r\n>S001: 0.00\r\n>"

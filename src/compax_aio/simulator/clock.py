@@ -7,7 +7,10 @@ import os
 import selectors
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from contextvars import Context
 from dataclasses import dataclass
+from heapq import heappush
+from math import inf
 from typing import TYPE_CHECKING, Any, TypeVarTuple, Unpack
 
 if TYPE_CHECKING:
@@ -37,11 +40,36 @@ class VirtualClockLoop(asyncio.SelectorEventLoop):
     def __init__(self) -> None:
         self._now = 0.0
         self._jobs: set[_Job] = set()
+        self._timers = 0
+        self._scheduled: list[asyncio.TimerHandle]
         super().__init__(_JumpingSelector(self))
 
     def time(self) -> float:
         """Return the virtual time in seconds."""
         return self._now
+
+    def call_at(
+        self,
+        when: float,
+        callback: Callable[[Unpack[_Ts]], object],
+        *args: *_Ts,
+        context: Context | None = None,
+    ) -> asyncio.TimerHandle:
+        """Call *callback* at time *when*; of timers for one time the oldest goes first, whatever others there are."""
+        if self.is_closed():
+            raise RuntimeError("Event loop is closed")
+        self._timers += 1
+        timer: Any = _Timer(when, callback, args, self, context)
+        timer.number = self._timers
+        heappush(self._scheduled, timer)
+        timer._scheduled = True  # noqa: SLF001  # so asyncio counts those that are cancelled
+        return timer  # type: ignore[no-any-return]
+
+    def jump_to_next_timer(self, at_most_s: float) -> None:
+        """Move the clock on to the very time of the next timer: sums of pauses are not exact."""
+        next_at = self._scheduled[0].when() if self._scheduled else inf
+        is_within = next_at - self._now <= at_most_s
+        self._now = max(self._now, next_at) if is_within else self._now + at_most_s
 
     def jump(self, seconds: float) -> None:
         """Move the clock on by *seconds*, as a loop that was blocked for so long would."""
@@ -89,6 +117,18 @@ class VirtualClockLoop(asyncio.SelectorEventLoop):
             self._jobs.discard(job)
 
 
+class _Timer(asyncio.TimerHandle):
+    """A timer that knows which of two for the same time is the older one; a heap alone does not."""
+
+    __slots__ = ("number",)
+
+    def __lt__(self: Any, other: Any) -> bool:
+        mine, theirs = self._when, other._when  # asked so often that a method call counts
+        return bool(mine < theirs or (mine == theirs and self.number < other.number))
+
+    number: int
+
+
 @dataclass(slots=True, eq=False)
 class _Job:
     """A call in a thread: the clock stands still until it has ended, cancelled or not, and its result has arrived."""
@@ -106,15 +146,18 @@ class _JumpingSelector(selectors.BaseSelector):
         self._selector = selectors.DefaultSelector()
         self._terminals: set[int] = set()
         self._looks_left = 0
+        self._descriptors = 0
 
     def register(self, fileobj: FileDescriptorLike, events: int, data: Any = None) -> selectors.SelectorKey:
         key = self._selector.register(fileobj, events, data)
+        self._descriptors += 1
         if os.isatty(key.fd):
             self._terminals.add(key.fd)
         return key
 
     def unregister(self, fileobj: FileDescriptorLike) -> selectors.SelectorKey:
         key = self._selector.unregister(fileobj)
+        self._descriptors -= 1
         self._terminals.discard(key.fd)
         return key
 
@@ -128,17 +171,17 @@ class _JumpingSelector(selectors.BaseSelector):
         if timeout is None or self._loop.waits_for_threads:
             return self._selector.select(None)
         # One descriptor is the loop's own, by which other threads wake it.
-        if len(self.get_map()) > 1:
+        if self._descriptors > 1:
             ready = self._selector.select(_REAL_SILENCE_OF_TERMINALS_S if self._terminals else _REAL_SILENCE_S)
             if ready:
                 return ready
-        self._loop.jump(max(timeout, 0.0))
+        self._loop.jump_to_next_timer(max(timeout, 0.0))
         return []
 
     def _has_nothing_to_see(self) -> bool:
         """Whether only the loop's own descriptor is there, and no thread that would write to it; now and then not."""
         self._looks_left -= 1
-        if len(self._selector.get_map()) > 1 or self._loop.waits_for_threads or self._looks_left <= 0:
+        if self._descriptors > 1 or self._looks_left <= 0 or self._loop.waits_for_threads:
             self._looks_left = _LOOKS_LEFT_OUT
             return False
         return True

@@ -60,9 +60,7 @@ class SimulatedDrive:
         delay_position_reached_s: Fault hook: ``$`` is sent so much later than it should be.
     """
 
-    def __init__(
-        self, knobs: Knobs | None = None, *, name: str = "drive", log_entries: int = MAX_ENTRIES
-    ) -> None:
+    def __init__(self, knobs: Knobs | None = None, *, name: str = "drive", log_entries: int = MAX_ENTRIES) -> None:
         self.knobs = knobs or Knobs()
         self.name = name
         self.log = Log(log_entries)

@@ -51,7 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if wanted.day:
             return run_day(wanted.hours, _print)
         if wanted.seed is not None:
-            return _replay(wanted.seed, wanted.keep, shrinks=not wanted.as_is, reconnecting=wanted.reconnecting)
+            return _replay(wanted.seed, wanted.keep, shrinks=not wanted.as_is)
         return _hunt(wanted)
     except KeyboardInterrupt:
         return 130
@@ -70,7 +70,6 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--seed", type=int, metavar="N", help="tell the story of one seed")
     parser.add_argument("--keep", type=_numbers, metavar="N,N", help="with --seed: nothing but these parts of it")
     parser.add_argument("--as-is", action="store_true", help="with --seed: do not shrink it")
-    parser.add_argument("--reconnecting", action="store_true", help="let lost lines be opened again, and lose more")
     parser.add_argument("--first", action="store_true", help="leave off at the first find")
     parser.add_argument("--quiet", action="store_true", help="list what is found, and tell no stories")
     parser.add_argument("--day", action="store_true", help="one long scenario: a day of eight drives")
@@ -87,8 +86,8 @@ def _numbers(text: str) -> tuple[int, ...]:
     return tuple(int(number) for number in text.split(","))
 
 
-def _replay(seed: int, keep: Sequence[int] | None, *, shrinks: bool, reconnecting: bool) -> int:
-    whole = scenario = draw_scenario(seed, reconnecting=reconnecting)
+def _replay(seed: int, keep: Sequence[int] | None, *, shrinks: bool) -> int:
+    whole = scenario = draw_scenario(seed)
     if keep is not None:
         scenario = scenario.keep(keep)
     testimony = simulate(scenario)
@@ -99,7 +98,7 @@ def _replay(seed: int, keep: Sequence[int] | None, *, shrinks: bool, reconnectin
         found = broken(testimony)
     _print(story(testimony, found, all_of_it=not shrinks))
     kept = f" --keep {','.join(map(str, scenario.numbers))}" if scenario != whole else ""
-    _print(f"again: python -m compax_aio.simulator.hunt{' --reconnecting' * reconnecting} --seed {seed}{kept}")
+    _print(f"again: python -m compax_aio.simulator.hunt --seed {seed}{kept}")
     return 1 if found else 0
 
 
@@ -115,21 +114,21 @@ def _hunt(wanted: argparse.Namespace) -> int:
     progress = _Progress(first=wanted.first)
     code = 0
     try:
-        hunt.go(seeds, jobs=wanted.jobs, reconnecting=wanted.reconnecting, until=until, on_progress=progress)
+        hunt.go(seeds, jobs=wanted.jobs, until=until, on_progress=progress)
     except _EnoughError:
         pass
     except KeyboardInterrupt:
         code = 130
     progress.end()
-    _summary(hunt, 0 if wanted.quiet else _TOLD, reconnecting=wanted.reconnecting)
+    _summary(hunt, 0 if wanted.quiet else _TOLD)
     return code or (1 if hunt.finds else 0)
 
 
-def _summary(hunt: Hunt, told: int, *, reconnecting: bool) -> None:
+def _summary(hunt: Hunt, told: int) -> None:
     _print(f"{hunt.tried} seeds, {hunt.seeds_a_second:.0f} a second, {len(hunt.finds)} break a promise")
     for find in hunt.finds[:told]:
         _print("")
-        _replay(find.seed, None, shrinks=True, reconnecting=reconnecting)
+        _replay(find.seed, None, shrinks=True)
     for find in hunt.finds[told:]:
         _print(f"seed {find.seed}: {', '.join(find.promises)}")
 

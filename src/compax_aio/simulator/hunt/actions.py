@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 import asyncio
+import tempfile
 from collections.abc import Awaitable, Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from random import Random
 from typing import Any, Final
 
 from compax_aio.compax.drive import Drive
 from compax_aio.compax.group import DriveGroup
-from compax_aio.compax.moves import Move, fetch_error
-from compax_aio.errors import CompaxError, MoveError
+from compax_aio.errors import CompaxError
 
+from . import moving
 from .scenario import Action
 from .stage import Stage
 
 __all__ = ["ACTIONS", "ActionKind"]
 
 Arguments = dict[str, Any]
-
-_WAITS_S: Final = (0.0, 0.0, 0.00107, 0.00411, 0.0207, 0.107, 0.407, 1.007)
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,157 +32,6 @@ class ActionKind:
     draw: Callable[[Random, int, list[float]], Arguments]
     do: Callable[[Stage, Action], Awaitable[None]]
     of_group: bool = False
-
-
-# Moves ------------------------------------------------------------------------------------------------------------
-
-
-def _number(random: Random, number: int) -> float:
-    """Return a distance that no other item has."""
-    return random.choice((-1, 1, 4)) * round(random.uniform(5, 60)) + number / 100
-
-
-def _draw_way(random: Random) -> Arguments:
-    return {
-        "way": random.choice(("await", "await", "await", "watch", "cancel", "stop", "stop drive", "time out", "speed")),
-        "patience_s": random.choice(_WAITS_S),
-        "timeout_s": random.choice((None, None, None, None, 0.3013, 0.0517)),
-    }
-
-
-def _draw_options(random: Random) -> Arguments:
-    options: Arguments = {"on_cancel": random.choice(("stop", "stop", "stop", "detach"))}
-    if random.random() < 0.4:
-        options["speed_percent"] = random.choice((25, 50, 100))
-    if random.random() < 0.15:
-        options["acceleration_ms"] = random.choice((0, 80, 300))
-    if random.random() < 0.12:
-        options["comparators"] = ((2, 3), (1, 4, 0))
-    if random.random() < 0.08:
-        options["steps"] = ((3, 40),)
-    return options
-
-
-def _draw_move(random: Random, number: int, bases: list[float]) -> Arguments:
-    relative = random.random() < 0.3
-    distance = _number(random, number)
-    return {
-        "method": "move_by" if relative else "move_to",
-        "number": distance if relative else bases[0] + distance,
-        "options": _draw_options(random),
-        **_draw_way(random),
-    }
-
-
-async def _move(stage: Stage, action: Action) -> None:
-    given = action.arguments
-    (axis,) = action.axes
-    move = stage.begin(
-        action,
-        axis,
-        given["method"],
-        lambda drive: getattr(drive, given["method"])(
-            given["number"], timeout_s=given["timeout_s"], **given["options"]
-        ),
-    )
-    if move is not None:
-        await _see_through(stage, action, move, [move])
-
-
-def _draw_home(random: Random, _: int, __: list[float]) -> Arguments:
-    return _draw_way(random)
-
-
-async def _home(stage: Stage, action: Action) -> None:
-    (axis,) = action.axes
-    move = stage.begin(action, axis, "home", lambda drive: drive.home(timeout_s=action.arguments["timeout_s"]))
-    if move is not None:
-        await _see_through(stage, action, move, [move])
-
-
-def _draw_prepare(random: Random, number: int, bases: list[float]) -> Arguments:
-    return {**_draw_move(random, number, bases), "trigger_s": random.choice((None, *_WAITS_S))}
-
-
-async def _prepare(stage: Stage, action: Action) -> None:
-    given = action.arguments
-    (axis,) = action.axes
-    move = stage.begin(
-        action,
-        axis,
-        f"prepare_{given['method']}",
-        lambda drive: getattr(drive, f"prepare_{given['method']}")(
-            given["number"], timeout_s=given["timeout_s"], **given["options"]
-        ),
-    )
-    if move is None:
-        return
-    futures: list[asyncio.Future[Any]] = [move, move.ready]  # type: ignore[attr-defined]
-    await asyncio.wait(futures, return_when=asyncio.FIRST_COMPLETED)
-    if given["trigger_s"] is None:
-        move.cancel()
-        return
-    await asyncio.sleep(given["trigger_s"])
-    with suppress(MoveError):
-        move.trigger()  # type: ignore[attr-defined]
-    await _see_through(stage, action, move, [move])
-
-
-def _draw_group(random: Random, number: int, bases: list[float]) -> Arguments:
-    return {
-        "home": random.random() < 0.15,
-        "targets": [base + _number(random, number) for base in bases],
-        "speed_percent": random.choice((None, 50, 100)),
-        **_draw_way(random),
-    }
-
-
-async def _move_group(stage: Stage, action: Action) -> None:
-    given = action.arguments
-    drives = {axis: stage.drives[axis] for axis in action.axes}
-    calls = {axis: stage.note(action.number, axis, "group move", given) for axis in drives}
-    try:
-        group = DriveGroup(**drives)
-        if given["home"]:
-            move = group.home(timeout_s=given["timeout_s"])
-        else:
-            targets: Any = dict(zip(drives, given["targets"], strict=False))
-            move = group.move_to(speed_percent=given["speed_percent"], timeout_s=given["timeout_s"], **targets)
-    except CompaxError as error:
-        for call in calls.values():
-            stage.ended(call, error)
-        return
-    move.add_done_callback(fetch_error)
-    for axis, each in move.moves.items():
-        stage.follow(calls[axis], each)
-    await _see_through(stage, action, move, list(move.moves.values()))
-
-
-async def _see_through(stage: Stage, action: Action, move: asyncio.Future[Any], moves: list[Move]) -> None:
-    """Await it, perhaps not for long, or stop it on the way."""
-    given = action.arguments
-    match given["way"]:
-        case "watch":
-            async for _ in moves[0].positions():
-                pass
-        case "cancel":
-            await asyncio.wait([move], timeout=given["patience_s"])
-            move.cancel()
-        case "time out":
-            with suppress(TimeoutError, CompaxError):
-                await asyncio.wait_for(move, given["patience_s"] or 0.3017)
-        case "stop" | "stop drive":
-            await asyncio.wait([move], timeout=given["patience_s"])
-            axis = action.axes[0]
-            what = "stop" if given["way"] == "stop drive" else "stop move"
-            call = stage.note(action.number, axis, what, None if what == "stop" else moves[0])
-            await stage.tell(call, stage.drives[axis].stop() if what == "stop" else moves[0].stop())
-        case "speed":
-            await asyncio.wait([move], timeout=given["patience_s"])
-            call = stage.note(action.number, action.axes[0], "change_speed")
-            await stage.tell(call, moves[0].change_speed(60))
-    with suppress(CompaxError):
-        await move
 
 
 # Stopping and settling --------------------------------------------------------------------------------------------
@@ -293,7 +142,7 @@ async def _follow_events(stage: Stage, action: Action) -> None:
 
 def _draw_command(random: Random, number: int, bases: list[float]) -> Arguments:
     if random.random() < 0.5:
-        return {"text": f"PA{bases[0] + _number(random, number):.2f}", "moves": True}
+        return {"text": f"PA{bases[0] + moving.away(random, number):.2f}", "moves": True}
     return {"text": random.choice(("SD 50", "AL 100", "OT O7=1", "VP", "GOTO 302", "GOTO 270")), "moves": False}
 
 
@@ -365,14 +214,15 @@ async def _configure(stage: Stage, action: Action) -> None:
 
 
 async def _save_and_restore(stage: Stage, action: Action) -> None:
-    path = stage.folder / f"{action.number}.toml"
+    with tempfile.TemporaryDirectory(prefix="hunt") as folder:
+        path = Path(folder) / "values.toml"
 
-    async def save_and_restore(drive: Drive) -> None:
-        await drive.variables.save(path)
-        await drive.variables.write(7, action.arguments["value"])
-        await drive.variables.restore(path)
+        async def save_and_restore(drive: Drive) -> None:
+            await drive.variables.save(path)
+            await drive.variables.write(7, action.arguments["value"])
+            await drive.variables.restore(path)
 
-    await stage.ask(action, "restore", save_and_restore)
+        await stage.ask(action, "restore", save_and_restore)
 
 
 # Programs ---------------------------------------------------------------------------------------------------------
@@ -408,10 +258,10 @@ def _draw_events(random: Random, _: int, __: list[float]) -> Arguments:
 
 
 ACTIONS: Final[Mapping[str, ActionKind]] = {
-    "move": ActionKind(6, _draw_move, _move),
-    "home": ActionKind(1, _draw_home, _home),
-    "prepare": ActionKind(2.5, _draw_prepare, _prepare),
-    "group move": ActionKind(3, _draw_group, _move_group, of_group=True),
+    "move": ActionKind(6, moving.draw_move, moving.move),
+    "home": ActionKind(1, moving.draw_home, moving.home),
+    "prepare": ActionKind(2.5, moving.draw_prepare, moving.prepare),
+    "group move": ActionKind(3, moving.draw_group, moving.move_group, of_group=True),
     "stop": ActionKind(2, _nothing, _stop),
     "group stop": ActionKind(0.7, _nothing, _stop_group, of_group=True),
     "reconcile": ActionKind(1, _nothing, _reconcile),

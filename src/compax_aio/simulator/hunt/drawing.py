@@ -60,18 +60,17 @@ _OTHER_KNOBS: Final[dict[str, tuple[Any, ...]]] = {
 """What each knob may be besides its default."""
 
 _CHANCE_OF_A_KNOB: Final = 0.05
+_CHANCE_OF_A_MESSAGE_TOO_MANY: Final = 0.1
+_CHANCE_OF_MACHINE_ZERO: Final = 0.3
+_CHANCE_OF_RECONNECTING: Final = 0.55
+"""That the lines of a scenario are opened again when they are lost, and more is done to them."""
 _HALF_LINES: Final = (b"PA5", b"POSR 1", b"S", b"PA100$", b"SD")
 
 
-def draw_scenario(seed: int, *, reconnecting: bool = False) -> Scenario:
-    """
-    Draw the scenario of *seed*; most are short, so that what they find is easy to read.
-
-    Args:
-        seed: Any number.
-        reconnecting: Lost lines are opened again, and more is done to them.
-    """
+def draw_scenario(seed: int) -> Scenario:
+    """Draw the scenario of *seed*; most are short, so that what they find is easy to read."""
     random = Random(seed)
+    reconnecting = random.random() < _CHANCE_OF_RECONNECTING
     heavy = random.random() < 0.04
     axes = _AXES[: random.choices((1, 2, 3, 4), (55, 28, 14, 3))[0]]
     drives = tuple(
@@ -96,19 +95,18 @@ def draw_drive(number: int, axis: str, random: Random, *, usual: bool = False, r
     knobs |= {
         name: random.choice(others) for name, others in _OTHER_KNOBS.items() if random.random() < _CHANCE_OF_A_KNOB
     }
+    if random.random() < _CHANCE_OF_A_MESSAGE_TOO_MANY:
+        knobs["position_reached_on_stop"] = True
     if random.random() < 0.08:
         knobs["baudrate"] = random.choice((9600, 4800))
     binary = random.random() < 0.05
     if binary:
         knobs["p20"] = 16
     left_over = random.choice(_HALF_LINES) if random.random() < 0.08 else b""
-    return DrivePlan(
-        number=number,
-        axis=axis,
-        knobs=Knobs(**knobs),
-        settings=_settings(random, knobs, binary=binary, reconnecting=reconnecting),
-        left_over=left_over,
-    )
+    settings = _settings(random, knobs, binary=binary, reconnecting=reconnecting)
+    if random.random() < _CHANCE_OF_MACHINE_ZERO:  # which a drive forgets that is switched off, and so shows it
+        knobs["homed"] = True
+    return DrivePlan(number=number, axis=axis, knobs=Knobs(**knobs), settings=settings, left_over=left_over)
 
 
 def _settings(random: Random, knobs: dict[str, Any], *, binary: bool, reconnecting: bool) -> DriveSettings:

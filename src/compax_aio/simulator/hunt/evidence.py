@@ -10,6 +10,7 @@ from functools import cached_property
 from typing import Final, NamedTuple
 
 from compax_aio.compax.events import ConnectionLost, ConnectionRestored
+from compax_aio.compax.facts.line import XOFF, XON
 from compax_aio.simulator.compax.log import LogEntry, LogKind
 
 from .testimony import Call, Seen, SeenAxis, WireEntry, WireKind
@@ -37,6 +38,9 @@ FORGES_TO_DRIVE: Final = (
     "insert to_drive",
     "another host to_drive",
 )
+
+
+_NOT_TEXT: Final = bytes({0, XON, XOFF})
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,6 +120,24 @@ class Evidence:
                 outages[-1] = Outage(outages[-1].since, event.at, event.signs_of_restart)
         return outages
 
+    @cached_property
+    def attempts(self) -> list[tuple[float, float]]:
+        """When it was tried to open its line, and when that attempt, or the line that came of it, ended."""
+        attempts = []
+        for entry in self.axis.wire:
+            if entry.kind is WireKind.OPENED:
+                at = bisect_left(self._ends_at, entry.at)
+                attempts.append((entry.at, self._ends_at[at] if at < len(self._ends_at) else float("inf")))
+            elif entry.kind is WireKind.BEFELL and entry.text == "refused":
+                attempts.append((entry.at, entry.at))
+        return attempts
+
+    def was_closed(self, at: float, *, by_user: bool = False) -> bool:
+        """Whether its drive had been closed *at* that time; *by_user*, not because all was over."""
+        return any(
+            call.what == "close" and call.asked_at <= at and not (by_user and call.item < 0) for call in self.axis.calls
+        )
+
     def is_out(self, since: float, until: float) -> bool:
         """Whether its line was lost, or closed, at any time from *since* to *until*."""
         return self.was_lost(since, until) or any(each.since <= until and each.until >= since for each in self.outages)
@@ -159,12 +181,22 @@ class Evidence:
         return by_key
 
     def answers_to(self, query: str, since: float, until: float) -> Iterator[Said]:
-        """List what the drive has answered to a query, ``S1``, that came after *since*, until *until*."""
+        """List what the drive has answered to a query, ``S1``, that came after *since*, until *until*; last first."""
         said = self._by_key.get(f"{query[0]}{int(query[1:]):03d}", [])
-        for at in range(bisect_left(said, since, key=lambda each: each.asked_at), len(said)):
-            if said[at].said_at > until:
+        for at in range(bisect_right(said, until, key=lambda each: each.said_at) - 1, -1, -1):
+            if said[at].asked_at < since:
                 return
             yield said[at]
+
+    @cached_property
+    def _read(self) -> list[WireEntry]:
+        return [entry for entry in self.axis.wire if entry.kind is WireKind.READ]
+
+    def heard(self, since: float, until: float) -> str:
+        """Return what has come to the client, whoever has said it, from *since* to *until*."""
+        first = bisect_left(self._read, since, key=lambda entry: entry.at)
+        last = bisect_right(self._read, until, key=lambda entry: entry.at)
+        return b"".join(entry.data for entry in self._read[first:last]).translate(None, _NOT_TEXT).decode("latin-1")
 
     @cached_property
     def _by_kind(self) -> dict[LogKind, list[LogEntry]]:
@@ -186,7 +218,11 @@ class Evidence:
 
     def may_be_forged(self, call: Call) -> bool:
         """Whether what the drive said may have been changed before the caller of *call* was told of it."""
-        return self.befell(*FORGES_TO_HOST, since=self._before(call), until=call.ended_at or float("inf"))
+        return self.is_forged(call.asked_at, call.ended_at or float("inf"))
+
+    def is_forged(self, since: float, until: float) -> bool:
+        """Whether what the drive said from *since* to *until* may have been changed."""
+        return self.befell(*FORGES_TO_HOST, since=since - 2 * self.settings.answer_timeout_s, until=until)
 
     def may_be_misheard(self, call: Call) -> bool:
         """Whether what was said on behalf of *call* may have arrived as something else."""

@@ -9,7 +9,6 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import partial
 from multiprocessing.pool import Pool
 from typing import Final
 
@@ -65,7 +64,6 @@ class Hunt:
         seeds: Iterable[int],
         *,
         jobs: int = 1,
-        reconnecting: bool = False,
         until: float | None = None,
         on_progress: Callable[[Hunt], None] = lambda _: None,
     ) -> None:
@@ -75,11 +73,10 @@ class Hunt:
         Args:
             seeds: May be endless, with *until*.
             jobs: How many processes.
-            reconnecting: Whether lost lines are opened again.
             until: When to leave off, on the monotonic clock.
             on_progress: Called from time to time, and with every find.
         """
-        with _tries(seeds, jobs, partial(try_seed, reconnecting=reconnecting)) as tries:
+        with _tries(seeds, jobs, try_seed) as tries:
             for tried, find in tries:
                 self.tried += tried
                 if find is not None:
@@ -110,11 +107,11 @@ def _ignore_ctrl_c() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def try_seed(seed: int, *, reconnecting: bool = False) -> Find | None:
+def try_seed(seed: int) -> Find | None:
     """Run the scenario of *seed*; None if it breaks no promise."""
     try:
         with _not_for_ever():
-            found = broken(simulate(draw_scenario(seed, reconnecting=reconnecting)))
+            found = broken(simulate(draw_scenario(seed)))
     except Exception as error:
         error.add_note(f"in the simulation of seed {seed}")
         raise

@@ -11,7 +11,6 @@ from typing import Any, Final
 from compax_aio.compax.codecs import DriveStatus
 from compax_aio.compax.events import ComparatorPassed, Fault, PositionMessage
 from compax_aio.compax.moves import MoveResult
-from compax_aio.compax.settings import DriveSettings
 from compax_aio.errors import (
     CommandRejectedError,
     CompaxError,
@@ -31,11 +30,16 @@ _EPSILON_S: Final = 1e-6
 _TOLERANCE: Final = 0.0511
 """By so much may the axis stand beside its target: five of the last of two decimals."""
 _LONGEST_TRAVEL_S: Final = 400.0
-_HEAVIEST_DRIVE: Final = 50_000
-"""Bytes; one that nothing befell keeps four fifths of that."""
+_HEAVIEST_DRIVE: Final = 64_000
+"""Bytes; one that nothing befell keeps two thirds of that, one whose line was lost its last error as well."""
 
 _LONGEST_TOLD: Final = 400
-_ASKED_AGAIN: Final = 2
+
+_NUMBERS: Final = re.compile(r"([-+]?)\s*(\d+(?:\.\d*)?|\.\d+)")
+_LONGEST_READING_S: Final = 600.0
+"""From the first value of a reading to the last, at most: half of a line in trouble."""
+_MARKERS_AGAIN: Final = 2
+"""While answers come, late, there may be as many markers again."""
 
 _SINGLE: Final = ("position", "target", "speed", "error", "query", "parameter", "read_status", "record", "command S1")
 """Calls that ask one line."""
@@ -65,7 +69,7 @@ def _too_long(case: Case, evidence: Evidence, call: Call) -> str | None:
         bound_s = 2 * evidence.settings.answer_timeout_s + case.stalled_s + _EPSILON_S
         if _longest_pause_s(evidence, call.asked_at, call.ended_at) > bound_s:
             return f"the line was idle for more than {bound_s:.1f} s"
-        if (markers := _markers_in_vain(evidence, call)) > evidence.settings.resync_attempts:
+        if (markers := _markers_in_vain(evidence, call)) > _MARKERS_AGAIN * evidence.settings.resync_attempts:
             return f"it waited for {markers} markers in vain"
     if call.ended_at - call.asked_at <= _LONGEST_TRAVEL_S or call.what == "watch":
         return None
@@ -75,13 +79,18 @@ def _too_long(case: Case, evidence: Evidence, call: Call) -> str | None:
 
 def _longest_pause_s(evidence: Evidence, since: float, until: float) -> float:
     times = [since, *(line.at for line in evidence.turns.between(since, until)), until]
-    return max(after - before for before, after in pairwise(times))
+    pauses_s = [after - before for before, after in pairwise(times) if not evidence.is_out(before, after)]
+    return max(pauses_s, default=0.0)
 
 
 def _markers_in_vain(evidence: Evidence, call: Call) -> int:
     """Count how many markers in a row were not answered while *call* waited."""
     most = row = 0
+    before_at = call.asked_at
     for line in evidence.turns.between(call.asked_at, call.ended_at or 0.0):
+        if evidence.was_lost(before_at, line.at):
+            row = 0  # each line that is opened is tried anew
+        before_at = line.at
         if call.asked_at < line.at < (call.ended_at or 0.0):
             is_vain = line.is_marker and line.in_doubt and line.over_at is None
             row = row + 1 if is_vain else row if line.text == evidence.settings.dialect.stop else 0
@@ -125,35 +134,46 @@ def own_answers(case: Case) -> Iterator[str]:
     """P4: an answer is what the drive said to a line that it was sent after the call; never to an earlier one."""
     for name, evidence in case.axes.items():
         for call in evidence.axis.calls:
-            if isinstance(call.outcome, BaseException) or call.ended_at is None or evidence.may_be_forged(call):
+            if isinstance(call.outcome, BaseException) or call.ended_at is None:
                 continue
-            for query, value, since in _values(call, evidence.settings):
-                if not _was_said(evidence, query, value, since, call.ended_at):
+            for query, value, since, until in _values(call, evidence.settings.answer_timeout_s + case.stalled_s):
+                if _was_said(evidence, query, value, since, until):
+                    continue
+                if not evidence.is_forged(since, until):
                     yield f"{name}: {value!r} is not what it said to {query} since {since:.4f}: {_short(call)}"
+                elif not _was_heard(evidence, value, since, until):
+                    yield f"{name}: {value!r} is not what came since {since:.4f}, from whomever: {_short(call)}"
 
 
 def _short(call: Call) -> str:
     return str(call)[:_LONGEST_TOLD]
 
 
-def _values(call: Call, settings: DriveSettings) -> Iterator[tuple[str, Any, float]]:
-    """List what was told to a caller, by the query that it is the answer to, and since when that was asked."""
-    since = call.asked_at
+def _values(call: Call, answer_takes_s: float) -> Iterator[tuple[str, Any, float, float]]:
+    """List what was told to a caller, by the query that it is the answer to, and when that was asked and answered."""
+    since, until = call.asked_at, call.ended_at or 0.0
     if call.what in _QUERIES:
         value = getattr(call.outcome, "value", call.outcome)
-        yield _QUERIES[call.what], value, since
+        yield _QUERIES[call.what], value, since, until
     elif call.what == "status" and isinstance(call.outcome, DriveStatus):
-        yield "S16", call.outcome.s16, since
-        yield "S17", call.outcome.s17, since
+        yield "S16", call.outcome.s16, since, until
+        yield "S17", call.outcome.s17, since, until
     elif call.what == "write":
-        yield call.detail[0], call.outcome, since
+        yield call.detail[0], call.outcome, since, until
     elif call.what == "watch":
         for reading in call.outcome:
             # A watch is served by a question that was on its way when it began.
-            since = reading.at - (1 + _ASKED_AGAIN * settings.reconnect) * settings.answer_timeout_s
+            since, latest = reading.at - answer_takes_s, reading.at + _LONGEST_READING_S
             for quantity, value in reading.values.items():
                 if quantity != "status":
-                    yield _NAMED.get(quantity, quantity), getattr(value, "value", value), since
+                    yield _NAMED.get(quantity, quantity), getattr(value, "value", value), since, min(until, latest)
+
+
+def _was_heard(evidence: Evidence, value: Any, since: float, until: float) -> bool:
+    heard = evidence.heard(since - _EPSILON_S, until + _EPSILON_S)
+    if isinstance(value, float | int):
+        return any(float(f"{sign}{digits}") == value for sign, digits in _NUMBERS.findall(heard))
+    return "".join(str(value).split()) in "".join(heard.split())
 
 
 def _was_said(evidence: Evidence, query: str, value: Any, since: float, until: float) -> bool:
@@ -194,7 +214,7 @@ def _was_stopped(case: Case, evidence: Evidence, call: Call) -> bool:
     stop = evidence.settings.dialect.stop
     timeout_s = evidence.settings.answer_timeout_s
     latest = call.ended_at + 2 * timeout_s + case.stalled_s + _EPSILON_S
-    if evidence.was_lost(0.0, latest):
+    if evidence.is_out(call.ended_at, latest):
         return True
     lines = evidence.turns.lines
     if any(line.text == stop and call.ended_at - _EPSILON_S <= line.at <= latest for line in lines):
@@ -215,8 +235,9 @@ def _may_go_on(evidence: Evidence) -> bool:
     axis = evidence.axis
     detached = any(call.on_cancel == "detach" for call in axis.calls)
     told = any(call.what == "close" and isinstance(call.outcome, CompaxError) for call in axis.calls)
-    lost = evidence.befell("cut", "moved at its panel", "power begins", "fault begins", *_FORGING)
-    return detached or told or lost or bool(axis.plan.left_over)
+    lost = evidence.befell("moved at its panel", "power begins", "blackout begins", "fault begins", *_FORGING)
+    is_cut = not evidence.comes_back and evidence.befell("cut")
+    return detached or told or lost or is_cut or bool(axis.plan.left_over)
 
 
 _FORGING: Final = tuple(f"{kind} begins" for kind, what in TROUBLES.items() if what.forges)
@@ -253,15 +274,22 @@ def _untrue(evidence: Evidence, call: Call) -> Iterator[str]:
         if not causes and not evidence.axis.plan.knobs.self_test_s:
             yield "there was no fault"
     elif call.move is not None and _says_not_taken(call.outcome):
-        if _has_begun(evidence, call) and not evidence.befell("power") and not evidence.may_be_misheard(call):
+        if (
+            _has_begun(evidence, call)
+            and not evidence.befell("power", "blackout")
+            and not evidence.may_be_misheard(call)
+        ):
             yield "it had begun"
     elif _stands_they_say(evidence, call) and call.moving_then and not _moved_since(evidence, call):
         yield "the axis moves"
 
 
 def _stands_they_say(evidence: Evidence, call: Call) -> bool:
-    is_said = call.what in {"stop", "close"} and call.outcome is None
-    return is_said and not evidence.was_lost(0.0, call.ended_at or 0.0)
+    if call.outcome is not None:
+        return False
+    # A line that is lost for good cannot be used for a stop: whoever awaited the move has been told.
+    is_lost = not evidence.comes_back and evidence.was_lost(0.0, call.ended_at or 0.0)
+    return call.what == "stop" or (call.what == "close" and not is_lost)
 
 
 def _untrue_result(evidence: Evidence, call: Call, result: MoveResult) -> Iterator[str]:

@@ -11,12 +11,12 @@ from itertools import pairwise
 from typing import Final
 
 from compax_aio.errors import AnswerTimeoutError, ConnectionLostError, InvalidCommandError, MoveInDoubtError
-from compax_aio.simulator.compax.log import LogKind
+from compax_aio.simulator.compax.log import LogEntry, LogKind
 
 from .evidence import FORGES_TO_DRIVE, Case, Evidence
 from .scenario import Scenario
 from .simulation import PROGRAM_TARGET, simulate
-from .testimony import Call, Seen, WireEntry, WireKind
+from .testimony import Call, Seen, WireEntry
 from .troubles import PANEL_TARGET
 from .turns import Written
 
@@ -74,9 +74,10 @@ def at_most_once(case: Case) -> Iterator[str]:
     """P2: one call puts its motion on the wire once at most; a drive in doubt takes no motion."""
     for name, evidence in case.axes.items():
         said = Counter(_plain(line) for line in evidence.turns.lines)
+        asked = _asked_for(evidence)
         moves = [call for call in evidence.axis.calls if call.move is not None]
         for call in evidence.axis.calls:
-            yield from (f"{name}: {wrong}: {call}" for wrong in _too_often(call, said))
+            yield from (f"{name}: {wrong}: {call}" for wrong in _too_often(call, said, asked))
         yield from _told_too_often(evidence, said)
         for word, calls in (
             ("!", sum(call.move is not None and call.move.sent == "!" for call in moves)),
@@ -89,20 +90,27 @@ def at_most_once(case: Case) -> Iterator[str]:
             if line.text == "!" and not before.text.endswith(","):
                 yield f"{name}: ! was written at {line.at:.4f} behind {before.text!r}, which stores nothing"
         yield from _motions_while_in_doubt(evidence)
-        yield from _written_for_nobody(evidence, said)
-        yield from _motions_of_nobody(evidence)
+        yield from _written_for_nobody(evidence, said, asked)
+        yield from _motions_of_nobody(evidence, said, asked)
 
 
-def _too_often(call: Call, said: Counter[str]) -> Iterator[str]:
+def _asked_for(evidence: Evidence) -> Counter[str]:
+    """Count how often each motion was asked for."""
+    return Counter(_canonical(call.text) for call in evidence.axis.calls if call.text is not None)
+
+
+def _too_often(call: Call, said: Counter[str], asked: Counter[str]) -> Iterator[str]:
     if call.text is None or call.text == "PH":
         return
     motion = _canonical(call.text)
     started = said[motion] + said[f"{motion}$"]
     stored = said[f"{motion},"] + said[f"{motion}$,"]
-    if started > 1:
+    if started > asked[motion]:
         yield f"{motion} was written {started} times"
-    if stored > 1:
+    if stored > asked[motion]:
         yield f"{motion} was stored {stored} times"
+    if asked[motion] > 1:  # in a long day
+        return
     if started and call.move is not None and call.move.sent == "!":
         yield f"{motion} was written, and executed with ! as well"
     if started and (
@@ -122,18 +130,16 @@ def _told_too_often(evidence: Evidence, said: Counter[str]) -> Iterator[str]:
     for text in ("OT O7=1", "VP", "GOTO 302"):
         if said[text] > asked[text]:
             yield f"{evidence.name}: {text!r} was written {said[text]} times, for {asked[text]} calls"
-    for call in calls:
-        if call.what == "write":
-            name, value = call.detail
-            if (count := said[f"{name}={value:g}"]) > 1:
-                yield f"{evidence.name}: {name} was written {count} times: {call}"
+    written = Counter(_canonical("{}={}".format(*call.detail)) for call in calls if call.what == "write")
+    for text, times in written.items():
+        if said[text] > times:
+            yield f"{evidence.name}: {text!r} was written {said[text]} times, for {times} calls"
 
 
-def _written_for_nobody(evidence: Evidence, said: Counter[str]) -> Iterator[str]:
+def _written_for_nobody(evidence: Evidence, said: Counter[str], asked: Counter[str]) -> Iterator[str]:
     """Find motions that were written, and are of no call; whatever befell the line."""
-    of_calls = {_canonical(call.text) for call in evidence.axis.calls if call.text is not None}
     for text in said:
-        if _TARGETED.match(text) and text.rstrip(_SIGNS) not in of_calls:
+        if _TARGETED.match(text) and text.rstrip(_SIGNS) not in asked:
             yield f"{evidence.name}: {text!r} was written, and nobody has asked for it"
 
 
@@ -149,7 +155,7 @@ def _plain(line: Written) -> str:
 
 def _canonical(text: str) -> str:
     """Write PA12.5$ as PA12.500$, whatever its decimals."""
-    found = re.fullmatch(rf"(P[AR])({_NUMBER})([$,]*)", text)
+    found = re.fullmatch(rf"(P[AR]|[PV]\d+=)({_NUMBER})([$,]*)", text)
     return f"{found[1]}{float(found[2]):.3f}{found[3]}" if found else text
 
 
@@ -170,30 +176,46 @@ def _is_motion(line: Written) -> bool:
     return _MOTION.match(text) is not None and " " not in text
 
 
-def _motions_of_nobody(evidence: Evidence) -> Iterator[str]:
-    """Find where the drive went, and nobody had sent it."""
-    base = evidence.axis.plan.knobs.position
-    calls = evidence.axis.calls
-    usual = {round(base + PROGRAM_TARGET, 2), PANEL_TARGET}
-    known = usual | {
-        round(call.move.plan.target, 2) for call in calls if call.move and call.move.plan.target is not None
-    }
-    known |= {float(call.text[2:]) for call in calls if call.move is None and call.text}
-    if evidence.befell(*FORGES_TO_DRIVE) or evidence.axis.plan.left_over:
+def _motions_of_nobody(evidence: Evidence, said: Counter[str], asked: Counter[str]) -> Iterator[str]:
+    """Find where the drive went, and nobody had sent it; what it heard, and the client has not said, excuses that."""
+    if evidence.axis.plan.left_over or (evidence.axis.plan.knobs.p20 and evidence.befell(*FORGES_TO_DRIVE)):
         return
-    begun = [entry.text for entry in evidence.happened(LogKind.MOTION_STARTED)]
-    for text in set(begun):
-        target = text.removeprefix("POSA ")
-        if re.fullmatch(_NUMBER, target) and float(target) not in usual and begun.count(text) > 1:
-            yield f"{evidence.name}: it began {text} {begun.count(text)} times"
+    heard = Counter(map(_in_short, evidence.happened(LogKind.LINE)))
+    forged = heard - said
+    begun = Counter(entry.text for entry in evidence.happened(LogKind.MOTION_STARTED))
+    relative = _relative(evidence)
+    usual = {round(evidence.axis.plan.knobs.position + PROGRAM_TARGET, 2), PANEL_TARGET}
+    for text, count in begun.items():
+        word, _, target = text.rpartition(" ")
+        motion = _canonical(f"PA{target}") if word == "POSA" else ""
+        if not motion or float(target) in usual:
+            continue
+        most = (
+            relative.count(float(target))
+            + asked[motion]
+            + sum(forged[f"{motion}{signs}"] for signs in ("", "$", ",", "$,"))
+        )
+        if count > most:
+            yield f"{evidence.name}: it began {text} {count} times, and was asked to {most} times"
     for word, of_calls in (("POSR ", "PR"), ("POSA HOME", "PH")):
-        asked = sum(call.text is not None and call.text.startswith(of_calls) for call in calls)
-        if (count := sum(text.startswith(word) for text in begun)) > asked:
-            yield f"{evidence.name}: it began {word} {count} times, and was asked to {asked} times"
-    for entry in evidence.happened(LogKind.MOTION_STARTED, LogKind.MOTION_CONTINUED):
-        word, _, target = entry.text.rpartition(" ")
-        if word == "POSA" and round(float(target), 2) not in known:
-            yield f"{evidence.name}: at {entry.at:.4f} it began {entry.text}, which nobody had asked for"
+        most = sum(count for text, count in (asked + forged).items() if text.startswith(of_calls))
+        if (count := sum(each for text, each in begun.items() if text.startswith(word))) > most:
+            yield f"{evidence.name}: it began {word} {count} times, and was asked to {most} times"
+
+
+def _relative(evidence: Evidence) -> list[float]:
+    """List where relative moves were to end: they begin as such, and are continued after a stop by START."""
+    moves = [call.move for call in evidence.axis.calls if call.move is not None]
+    return [round(move.target, 2) for move in moves if move.plan.distance is not None and move.target is not None]
+
+
+def _in_short(entry: LogEntry) -> str:
+    """Write a line that a drive has heard as a client writes it."""
+    text = entry.text.replace(" ", "").upper()
+    for long, short in (("POSAHOME", "PH"), ("POSA", "PA"), ("POSR", "PR")):
+        if text.startswith(long):
+            text = short + text.removeprefix(long)
+    return _canonical(text)
 
 
 # P6 ---------------------------------------------------------------------------------------------------------------

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from . import in_callers_ears, on_the_wire
+from . import in_callers_ears, lost_lines, on_the_wire
 from .evidence import Case
 from .testimony import Seen
 
@@ -17,14 +17,14 @@ Check = Callable[[Case], Iterator[str]]
 PROMISES: Final[Mapping[str, tuple[Check, ...]]] = {
     "P1": (on_the_wire.turns,),
     "P2": (on_the_wire.at_most_once,),
-    "P3": (in_callers_ears.settled,),
+    "P3": (in_callers_ears.settled, lost_lines.bounded),
     "P4": (in_callers_ears.own_answers,),
-    "P5": (in_callers_ears.safe_to_cancel,),
+    "P5": (in_callers_ears.safe_to_cancel, lost_lines.works_again),
     "P6": (on_the_wire.stop_is_next,),
     "P7": (on_the_wire.own_lines, on_the_wire.own_lines_exactly),
     "P8": (in_callers_ears.bounded_memory,),
     "P9": (on_the_wire.possible_lines,),
-    "P10": (in_callers_ears.nothing_invented,),
+    "P10": (in_callers_ears.nothing_invented, lost_lines.checked_before_motion),
 }
 """By number."""
 

@@ -5,42 +5,53 @@ from __future__ import annotations
 import asyncio
 import gc
 import logging
-import tempfile
-from pathlib import Path
-from typing import Final
+from collections.abc import Awaitable, Callable, Iterable, Iterator
+from contextlib import contextmanager
+from typing import Final, TypeVar
 
 import compax_aio
 from compax_aio.errors import CompaxError
 from compax_aio.simulator.clock import VirtualClockLoop
 from compax_aio.simulator.compax.drive import SimulatedDrive
+from compax_aio.simulator.compax.log import MAX_ENTRIES
 from compax_aio.simulator.line import DeviceLine
 
 from .actions import ACTIONS
 from .scenario import Action, DrivePlan, Scenario, Trouble
 from .stage import Stage
-from .testimony import Seen, SeenAxis
+from .testimony import Seen, SeenAxis, longest_opening_s
 from .troubled_line import TroubledLine
 from .troubles import Far, befall
 from .weighing import weigh
 
 __all__ = ["PROGRAM_TARGET", "simulate"]
 
+_Timed = TypeVar("_Timed", Action, Trouble)
+
 LONGEST_S: Final = 3600.0
 """Of virtual time: what has not ended then never will."""
 PROGRAM_TARGET: Final = 333.0
 """Where the program in every drive goes, from where its axis has its positions."""
+_COLLECTED_AFTER: Final = 20_000
+"""Objects more than before."""
+_LOOKED_EVERY_S: Final = 0.1
 _AFTERWARDS_S: Final = 60.0
 """So long it is watched whether an axis that was left begins to move."""
 
 
-def simulate(scenario: Scenario) -> Seen:
-    """Run *scenario*; two runs of the same one are the same to the last byte."""
+def simulate(scenario: Scenario, *, log_entries: int = MAX_ENTRIES) -> Seen:
+    """
+    Run *scenario*; two runs of the same one are the same to the last byte.
+
+    Args:
+        scenario: What is done, and what befalls.
+        log_entries: How much each simulated drive remembers of what it has done.
+    """
     testimony = Seen(scenario)
-    logging.getLogger("compax_aio").setLevel(logging.CRITICAL + 1)
     loop = VirtualClockLoop()
     try:
-        with tempfile.TemporaryDirectory(prefix="hunt") as folder:
-            loop.run_until_complete(_run(testimony, Path(folder)))
+        with _unlogged(), _rarely_collecting():
+            loop.run_until_complete(_run(testimony, log_entries))
         loop.run_until_complete(loop.shutdown_default_executor())
     finally:
         # Without a runner, which waits for every task: one that cannot be cancelled is what we look for.
@@ -48,19 +59,47 @@ def simulate(scenario: Scenario) -> Seen:
     return testimony
 
 
-async def _run(testimony: Seen, folder: Path) -> None:
+@contextmanager
+def _unlogged() -> Iterator[None]:
+    """Let nothing be written of troubles that are wanted."""
+    log = logging.getLogger("compax_aio")
+    usual = log.level
+    log.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        log.setLevel(usual)
+
+
+@contextmanager
+def _rarely_collecting() -> Iterator[None]:
+    """Look through what is kept less often: notes are many, and none of them is garbage."""
+    usual = gc.get_threshold()
+    gc.set_threshold(_COLLECTED_AFTER, 20, 1000)
+    try:
+        yield
+    finally:
+        gc.set_threshold(*usual)
+
+
+async def _run(testimony: Seen, log_entries: int) -> None:
     loop = asyncio.get_running_loop()
     loop.set_exception_handler(lambda _, context: testimony.complaints.append(_told(context)))
-    stage = Stage(testimony, folder)
+    stage = Stage(testimony)
     scenario = testimony.scenario
     for plan in scenario.drives:
-        _build(stage, plan)
+        _build(stage, plan, log_entries)
     opening = {plan.axis: asyncio.ensure_future(_open(stage, plan)) for plan in scenario.drives}
-    troubles = [asyncio.ensure_future(_befall(stage, trouble)) for trouble in scenario.troubles]
-    users = [asyncio.ensure_future(_act(stage, action, opening)) for action in scenario.actions]
+    troubles: list[asyncio.Task[None]] = []
+    users: list[asyncio.Task[None]] = []
+    starting = [
+        asyncio.ensure_future(_in_time(scenario.troubles, lambda each: _befall(stage, each), troubles)),
+        asyncio.ensure_future(_in_time(scenario.actions, lambda each: _act(stage, each, opening), users)),
+    ]
     begins_s = max((each.at_s for each in (*scenario.actions, *scenario.troubles)), default=0.0)
     await asyncio.wait(opening.values(), timeout=begins_s)
     await asyncio.sleep(max(0.0, begins_s - loop.time()))
+    await _all_ended(starting, testimony, "something does not begin")
     await _all_ended([*opening.values(), *users], testimony, "a caller waits for ever")
     testimony.left_at = loop.time()
     await _all_ended(troubles, testimony, "a trouble does not end")
@@ -85,14 +124,14 @@ async def _run(testimony: Seen, folder: Path) -> None:
         await asyncio.wait(left, timeout=LONGEST_S)
 
 
-def _build(stage: Stage, plan: DrivePlan) -> None:
+def _build(stage: Stage, plan: DrivePlan, log_entries: int) -> None:
     """Put a drive, and the line to it, where the client will find them."""
-    far = SimulatedDrive(plan.knobs, name=plan.axis)
+    far = SimulatedDrive(plan.knobs, name=plan.axis, log_entries=log_entries)
     base = plan.knobs.position
     far.load_program(["WAIT 100", f"POSA {base + PROGRAM_TARGET:.2f}", "END"])
     axis = SeenAxis(plan, far)
     stage.testimony.axes[plan.axis] = axis
-    stage.lines[plan.axis] = TroubledLine(plan.axis, far, axis.wire)
+    stage.lines[plan.axis] = TroubledLine(plan.axis, far, axis.wire, axis.strangers)
     if plan.left_over:
         DeviceLine.of(far).receive(plan.left_over)
 
@@ -102,14 +141,27 @@ async def _open(stage: Stage, plan: DrivePlan) -> None:
     work = _connect(stage.lines[plan.axis].url, plan)
     if (drive := await stage.tell(call, work)) is not None:
         stage.drives[plan.axis] = drive
+        stage.follow_events(plan.axis, drive)
 
 
 async def _connect(url: str, plan: DrivePlan) -> compax_aio.Drive:
     return await compax_aio.connect(url, name=plan.axis, settings=plan.settings)
 
 
+async def _in_time(
+    items: Iterable[_Timed], begin: Callable[[_Timed], Awaitable[None]], tasks: list[asyncio.Task[None]]
+) -> None:
+    """Begin each of *items* at its time; a day of them shall not wait side by side."""
+    loop = asyncio.get_running_loop()
+    for item in sorted(items, key=lambda each: each.at_s):
+        if item.at_s > loop.time():
+            now_is_the_time: asyncio.Future[None] = loop.create_future()
+            loop.call_at(item.at_s, now_is_the_time.set_result, None)
+            await now_is_the_time
+        tasks.append(asyncio.ensure_future(begin(item)))
+
+
 async def _befall(stage: Stage, trouble: Trouble) -> None:
-    await asyncio.sleep(trouble.at_s)
     for axis in trouble.axes or tuple(stage.lines)[:1]:
         await befall(trouble, Far(stage.axis(axis).far, stage.lines[axis]))
         if trouble.kind == "flood":
@@ -118,7 +170,6 @@ async def _befall(stage: Stage, trouble: Trouble) -> None:
 
 async def _act(stage: Stage, action: Action, opening: dict[str, asyncio.Task[None]]) -> None:
     """Let a user do something, and perhaps give it up."""
-    await asyncio.sleep(action.at_s)
     await asyncio.wait([opening[axis] for axis in action.axes])
     if not all(axis in stage.drives for axis in action.axes):
         return
@@ -149,6 +200,10 @@ def _heal(stage: Stage, axis: SeenAxis) -> None:
 async def _leave(stage: Stage, axis: str) -> None:
     """Ask once more, for that must work, and leave the block."""
     drive = stage.drives[axis]
+    if not drive.is_open and drive.settings.reconnect and not stage.is_closed(axis):
+        until_s = stage.now() + longest_opening_s(drive.settings)
+        while not drive.is_open and stage.now() < until_s:  # noqa: ASYNC110  # nobody tells
+            await asyncio.sleep(_LOOKED_EVERY_S)
     if drive.is_open:
         for what in ("settle", "settle", "probe"):
             await stage.tell(stage.note(-1, axis, what), drive.position())

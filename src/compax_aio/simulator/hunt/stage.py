@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
-from pathlib import Path
 from typing import Any
 
 from compax_aio.compax.drive import Drive
@@ -24,19 +23,18 @@ class Stage:
 
     Args:
         testimony: Where everything is noted.
-        folder: For files that users write.
 
     Attributes:
         drives: Those that are connected, by axis.
         lines: The line of each axis.
     """
 
-    def __init__(self, testimony: Seen, folder: Path) -> None:
+    def __init__(self, testimony: Seen) -> None:
         self.testimony = testimony
-        self.folder = folder
         self.drives: dict[str, Drive] = {}
         self.lines: dict[str, TroubledLine] = {}
         self._loop = asyncio.get_running_loop()
+        self._followers: set[asyncio.Task[None]] = set()
 
     def now(self) -> float:
         """Return the time of the event loop."""
@@ -45,6 +43,21 @@ class Stage:
     def axis(self, axis: str) -> SeenAxis:
         """Return what is noted of an axis."""
         return self.testimony.axes[axis]
+
+    def is_closed(self, axis: str) -> bool:
+        """Whether somebody has closed the drive of an axis."""
+        return any(call.what == "close" for call in self.axis(axis).calls)
+
+    def follow_events(self, axis: str, drive: Drive) -> None:
+        """Note all events of *drive* until it is closed."""
+        stream, events = drive.events(), self.axis(axis).events
+
+        async def follow() -> None:
+            async for event in stream:
+                events.append(event)
+
+        self._followers.add(task := self._loop.create_task(follow(), name=f"follows {axis}"))
+        task.add_done_callback(self._followers.discard)
 
     def note(self, item: int, axis: str, what: str, detail: Any = None, *, text: str | None = None) -> Call:
         """Note that something is asked now."""

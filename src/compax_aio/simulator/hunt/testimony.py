@@ -5,17 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from compax_aio.compax.events import DriveEvent
 from compax_aio.compax.moves import Move
+from compax_aio.compax.settings import DriveSettings
 from compax_aio.link.wire import readable
 from compax_aio.simulator.compax.drive import SimulatedDrive
 from compax_aio.simulator.compax.log import LogEntry, LogKind
 
 from .scenario import DrivePlan, Scenario
 
-__all__ = ["Call", "Seen", "SeenAxis", "WireEntry", "WireKind"]
+__all__ = ["Call", "Seen", "SeenAxis", "WireEntry", "WireKind", "longest_opening_s"]
+
+_GREETING_S: Final = 5.0
+"""Some fifteen queries to the slowest drive that is drawn, one answer of them lost."""
 
 
 class WireKind(StrEnum):
@@ -82,6 +86,13 @@ class Call:
         ended = "never" if self.ended_at is None else f"{self.ended_at:.4f}"
         given = "" if self.detail is None else f"({self.detail!r})"
         return f"{self.asked_at:9.4f} {self.axis}.{self.what}{given}, item {self.item}, ended {ended}: {self.outcome!r}"
+
+
+def longest_opening_s(settings: DriveSettings) -> float:
+    """Return how long it may take until a line that works, and is lost, is open again."""
+    # One attempt may have begun before it worked: its markers, and what it asks in greeting.
+    attempt_s = settings.answer_timeout_s * (2 * settings.resync_attempts + 2) + _GREETING_S
+    return 2 * (attempt_s + settings.reconnect_slowest_s)
 
 
 @dataclass(slots=True, eq=False)

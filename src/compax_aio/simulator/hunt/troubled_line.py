@@ -9,7 +9,8 @@ from typing import Any, Final, Literal
 
 from compax_aio.compax.facts.line import COMMAND_END, PROMPT
 from compax_aio.errors import TransportError
-from compax_aio.simulator.line import DeviceLine, SimulatedDevice
+from compax_aio.simulator.compax.drive import SimulatedDrive
+from compax_aio.simulator.line import DeviceLine
 from compax_aio.transports.loopback import LoopbackListener, LoopbackTransport, create_pair
 
 from .testimony import WireEntry, WireKind
@@ -18,7 +19,7 @@ __all__ = ["Direction", "Tamper", "TamperKind", "TroubledLine"]
 
 Direction = Literal["to_drive", "to_host"]
 
-TamperKind = Literal["lose", "garble", "double", "insert", "cut", "lose_end"]
+TamperKind = Literal["lose", "garble", "flip", "double", "insert", "cut", "lose_end"]
 
 _MOTION_BEGINS: Final = (b"P", b"!")
 _TOKEN_KEPT: Final = 64
@@ -46,23 +47,30 @@ class TroubledLine(LoopbackListener):
         name: Of the line.
         device: At its far end.
         wire: Where everything is noted.
+        strangers: Where other drives are noted that were on it.
 
     Attributes:
         delay_s: By direction: how much later bytes arrive; those behind them wait.
         piece: The most bytes that are handed on at once; None: as they come.
         vanishing: Half open: bytes vanish both ways, and nobody is told.
         refused: Nobody can connect.
+        keeps: What the device says while nobody is connected is kept for who connects next, as device servers do.
     """
 
-    def __init__(self, name: str, device: SimulatedDevice, wire: list[WireEntry]) -> None:
+    def __init__(
+        self, name: str, device: SimulatedDrive, wire: list[WireEntry], strangers: list[SimulatedDrive] | None = None
+    ) -> None:
         super().__init__(name, asyncio.Protocol)
         self.delay_s: dict[Direction, float] = {"to_drive": 0.0, "to_host": 0.0}
         self.piece: int | None = None
         self.vanishing = False
         self.refused = False
+        self.keeps = False
         self._loop = asyncio.get_running_loop()
         self._device = device
         self._wire = wire
+        self._strangers = [] if strangers is None else strangers
+        self._kept: list[bytes] | None = None
         self._tampers: list[Tamper] = []
         self._way: _Way | None = None
         self._is_held = False
@@ -78,9 +86,20 @@ class TroubledLine(LoopbackListener):
         line = DeviceLine.of(self._device)
         if line.occupied and self._way is not None:
             self._way.end()  # as a device server does with a connection that has gone silent
+        kept, self._kept = self._kept or [], None
+        if line.occupied:
+            line.disconnect()
         way = _Way(self, line)
         near, _ = create_pair(_Witness(self, protocol), way, self._loop, name=self.name)
+        for data in kept:
+            way.to_host(data)
         return near
+
+    def hung_up(self, line: DeviceLine) -> None:
+        """Take note that nobody is connected any more; keep what the device says, if that is wanted."""
+        if self.keeps and not line.occupied:
+            self._kept = []
+            line.connect(self._kept.append)
 
     # What troubles do
 
@@ -113,9 +132,17 @@ class TroubledLine(LoopbackListener):
         line = DeviceLine.of(self._device)
         line.receive(data)
 
-    def exchange_device(self, device: SimulatedDevice) -> None:
+    def exchange_device(self, device: SimulatedDrive) -> None:
         """Let whoever connects next find *device*."""
+        if self._kept is not None:
+            self._kept = None
+            DeviceLine.of(self._device).disconnect()
         self._device = device
+
+    def stranger(self, device: SimulatedDrive) -> None:
+        """Let whoever connects next find *device*, which is none of ours."""
+        self._strangers.append(device)
+        self.exchange_device(device)
 
     def heal(self) -> None:
         """End all troubles of the line."""
@@ -164,9 +191,16 @@ class TroubledLine(LoopbackListener):
         self.note(f"{tamper.kind} {tamper.direction}")
 
 
+def _flipped(byte: int) -> int:
+    """Make another digit, letter or sign of one, as two wrong bits do where nobody checks parity."""
+    return byte ^ 1 if chr(byte).isalnum() and chr(byte ^ 1).isalnum() else byte
+
+
 def _changed(tamper: Tamper, data: bytes) -> bytes:
     if tamper.kind == "garble":
         return bytes(byte | 0x80 for byte in data)  # a parity or framing error
+    if tamper.kind == "flip":
+        return bytes(_flipped(byte) for byte in data)
     if tamper.kind == "double":
         return data + data
     return tamper.data + data if tamper.kind == "insert" else b""
@@ -201,6 +235,7 @@ class _Way(asyncio.Protocol):
         if self._transport is not None:
             self._transport = None
             self._device.disconnect()
+            self._line.hung_up(self._device)
 
     def to_host(self, data: bytes) -> None:
         """Take what the drive sends."""
@@ -222,6 +257,7 @@ class _Way(asyncio.Protocol):
             transport, self._transport = self._transport, None
             self._device.disconnect()
             transport.abort()
+            self._line.hung_up(self._device)
 
     def _hand_on(self, direction: Direction, data: bytes) -> None:
         if self._transport is None:

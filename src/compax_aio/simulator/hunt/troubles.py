@@ -12,7 +12,7 @@ from typing import Any, Final
 from compax_aio.compax.facts.line import PROMPT
 from compax_aio.simulator.clock import VirtualClockLoop
 from compax_aio.simulator.compax.drive import SimulatedDrive
-from compax_aio.simulator.compax.instructions import MoveTo
+from compax_aio.simulator.compax.instructions import MoveTo, Stop
 from compax_aio.simulator.compax.knobs import Knobs
 from compax_aio.simulator.compax.refusals import RefusedError
 
@@ -24,6 +24,7 @@ __all__ = ["LASTS_S", "PANEL_TARGET", "TROUBLES", "Far", "TroubleKind", "befall"
 PANEL_TARGET: Final = 777.0
 """Where a drive goes that is moved at its own panel."""
 
+_STRANGER_SAYS_EVERY_S: Final = 0.01
 LASTS_S: Final = (0.0, 0.003, 0.02, 0.05, 0.2, 0.4, 0.7, 1.5, 6.0)
 _HALF_LINES: Final = (b"PA5", b"POSR 1", b"PA17.5$", b"S1", b"P40=", b"GOTO", b"SD 1", b"?", b"S0", b"PR3 SD")
 _NOISE: Final = (b"\x00\xff", b"\xa5?", b"?\r\n", b"S0", b"\r\n", b">", b"\xc1\xc1\xc1", b"\x13", b"\x11", PROMPT, b"E")
@@ -63,7 +64,7 @@ async def befall(trouble: Trouble, far: Far) -> None:
 
 
 def _draw_tamper(random: Random) -> Arguments:
-    kind = random.choice(("lose", "lose", "garble", "double", "cut"))
+    kind = random.choice(("lose", "lose", "garble", "flip", "double", "cut"))
     return {
         "direction": random.choice(("to_drive", "to_host")),
         "kind": kind,
@@ -105,21 +106,48 @@ async def _hold(far: Far, trouble: Trouble) -> None:
 
 async def _cut(far: Far, trouble: Trouble) -> None:
     far.line.refused = True
+    far.line.keeps = trouble.arguments.get("keeps", False)
     far.line.cut()
     await asyncio.sleep(trouble.lasts_s)
-    far.line.refused = False
+    far.line.refused = far.line.keeps = False
+
+
+async def _flapping(far: Far, trouble: Trouble) -> None:
+    for _ in range(trouble.arguments["times"]):
+        far.line.cut()
+        await asyncio.sleep(trouble.arguments["every_s"])
 
 
 async def _half_open(far: Far, trouble: Trouble) -> None:
     far.line.vanishing = True
     await asyncio.sleep(trouble.lasts_s)
     far.line.vanishing = False
+    if trouble.arguments.get("is_cut"):
+        far.line.cut()
+
+
+async def _blackout(far: Far, trouble: Trouble) -> None:
+    """Let the power of drive and device server fail, the server's a little before or after."""
+    far.line.refused = True
+    far.line.cut()
+    await asyncio.sleep(trouble.arguments["later_s"])
+    far.drive.power_off()
+    await asyncio.sleep(trouble.lasts_s)
+    far.drive.power_on()
+    far.line.refused = False
 
 
 async def _stranger(far: Far, trouble: Trouble) -> None:
-    far.line.exchange_device(SimulatedDrive(Knobs(position=trouble.arguments["position"]), name="stranger"))
+    stranger = SimulatedDrive(Knobs(position=trouble.arguments["position"]), name="stranger")
+    far.line.stranger(stranger)
+    if trouble.arguments.get("fault"):
+        stranger.raise_fault(trouble.arguments["fault"])
     far.line.cut()
-    await asyncio.sleep(trouble.lasts_s)
+    begun_at = asyncio.get_running_loop().time()
+    while trouble.arguments.get("says") and asyncio.get_running_loop().time() < begun_at + trouble.lasts_s:
+        await asyncio.sleep(_STRANGER_SAYS_EVERY_S)
+        stranger.inject(trouble.arguments["says"])
+    await asyncio.sleep(max(0.0, begun_at + trouble.lasts_s - asyncio.get_running_loop().time()))
     far.line.exchange_device(far.drive)
     far.line.cut()
 
@@ -192,6 +220,15 @@ async def _panel(far: Far, _: Trouble) -> None:
         drive.served_by.changed()
 
 
+async def _panel_stop(far: Far, _: Trouble) -> None:
+    drive = far.drive
+    with suppress(RefusedError):
+        drive._machine.execute(Stop(), False, asyncio.get_running_loop().time())  # noqa: SLF001
+    far.line.note("stopped at its panel")
+    if drive.served_by is not None:
+        drive.served_by.changed()
+
+
 async def _stall(_: Far, trouble: Trouble) -> None:
     loop = asyncio.get_running_loop()
     assert isinstance(loop, VirtualClockLoop)
@@ -215,9 +252,16 @@ TROUBLES: Final[Mapping[str, TroubleKind]] = {
     "pieces": TroubleKind(2, _one_of(size=(1, 2, 3, 5)), _pieces),
     "repeat": TroubleKind(1.5, _nothing, _repeat, forges=True),
     "hold": TroubleKind(1.5, _nothing, _hold),
-    "cut": TroubleKind(2, _nothing, _cut, reconnecting=2),
-    "half open": TroubleKind(1, _nothing, _half_open, reconnecting=1),
-    "stranger": TroubleKind(0, _one_of(position=(0.0, 4321.0)), _stranger, reconnecting=1),
+    "cut": TroubleKind(2, _one_of(keeps=(False, False, True)), _cut, reconnecting=4),
+    "flapping": TroubleKind(0, _one_of(times=(2, 3, 8), every_s=(0.01, 0.06, 0.3, 0.7)), _flapping, reconnecting=1),
+    "half open": TroubleKind(1, _one_of(is_cut=(False, True)), _half_open, reconnecting=1.5),
+    "blackout": TroubleKind(0, _one_of(later_s=(0.0, 0.05, 0.5, 3.0)), _blackout, reconnecting=2),
+    "stranger": TroubleKind(
+        0,
+        _one_of(position=(4321.0, 8765.0), fault=(None, None, 20), says=(b"", b"$\r\n>", b"$\r\n>", b"1\r\n>")),
+        _stranger,
+        reconnecting=3,
+    ),
     "other host": TroubleKind(1, _one_of(data=_HALF_LINES), _other_host, forges=True),
     "silent": TroubleKind(2, _nothing, _silent),
     "deaf": TroubleKind(2, _nothing, _deaf),
@@ -230,6 +274,7 @@ TROUBLES: Final[Mapping[str, TroubleKind]] = {
     "noise": TroubleKind(1.5, _one_of(data=_NOISE), _noise, forges=True),
     "flood": TroubleKind(0.3, _one_of(pieces=(3, 20, 300), data=(b"\x55", b"S001", b"\r\n")), _flood, forges=True),
     "panel": TroubleKind(0.7, _nothing, _panel),
+    "panel stop": TroubleKind(1, _nothing, _panel_stop),
     "stall": TroubleKind(1, _one_of(stall_s=(0.01, 0.2, 0.5, 3.0)), _stall),
 }
 """By name. What forges may excuse that a value, or a motion, is not what its sender meant."""

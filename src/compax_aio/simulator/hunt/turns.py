@@ -29,6 +29,7 @@ _NUMBER_BEFORE: Final = re.compile(r"[1-8]\s*(?=[SPVNE$])")
 _PLAIN: Final = re.compile(r"[ -~]*")
 _FRAME_OF_MOTION: Final = re.compile(rb"\x88[AR]")
 _LONGEST_ANSWER: Final = 256
+_STOPS_THAT_FILL_A_FRAME: Final = 2
 
 
 @dataclass(slots=True, eq=False)
@@ -45,6 +46,10 @@ class Written:
     """It was written while nobody knew what the drive would answer next."""
     over_at: float | None = None
     """When its turn was over; None if its time ran out."""
+    is_acknowledged: bool = False
+    """A bare prompt came to it."""
+    is_answered: bool = False
+    """An answer that bears its name came to it."""
 
     @property
     def key(self) -> tuple[str, str] | None:
@@ -137,7 +142,6 @@ class Turns:
                 self._cut_frame_at = None
             else:
                 self.violations.append(f"{entry.at:.4f}: {text!r} was written behind a frame that may be cut")
-        self._answers_to_go += text == self._stop and self._cut_frame_at is not None and self._answers_to_go < 2
         if is_frame and _FRAME_OF_MOTION.match(entry.data):
             self._frame = line
         self._outstanding, self._is_sure = line, True
@@ -155,7 +159,7 @@ class Turns:
         self._in_doubt = True
         if before is self._frame and self._cut_frame_at is None:
             self._cut_frame_at = before.at
-            self._answers_to_go = 0
+            self._answers_to_go = _STOPS_THAT_FILL_A_FRAME
 
     # Read -----------------------------------------------------------------------------------------------------------
 
@@ -221,6 +225,7 @@ class Turns:
         commands = [each for each in self._unanswered if each.key is None]
         if line is not None and line.key is None:
             self._over(line, at)
+            line.is_acknowledged = not self._in_doubt
             if not self._in_doubt:
                 self._unanswered.clear()
                 return
@@ -233,6 +238,7 @@ class Turns:
             last = self._unanswered[-1]
             # In doubt, the newest of a number is meant only if no older one is unanswered.
             self._settle_up_to(asked)
+            asked.is_answered = True
             if asked is self._outstanding:
                 self._over(asked, at)
             if asked is last:
@@ -240,6 +246,8 @@ class Turns:
 
     def _read_text(self, line: Written | None, at: float, *, is_error: bool) -> None:
         self._answered_something()
+        if is_error and self._in_doubt:
+            self._is_sure = False  # of an earlier line or of the last: the client may wait
         if line is not None and (is_error or line.key is None):
             self._over(line, at)
             if not self._in_doubt and is_error:
