@@ -72,7 +72,7 @@ class Identity:
         values: dict[int, str] = {}
         for number in _IDENTIFICATION:
             try:
-                values[number] = await self._read(number)
+                values[number] = await self._read_twice(number)
             except (AnswerTimeoutError, CommandRejectedError, UnexpectedAnswerError) as error:
                 _log.info("%s does not say who it is (S%d): %s", self._line.name, number, error)
                 is_known = bool(values) or not isinstance(error, AnswerTimeoutError)
@@ -94,6 +94,13 @@ class Identity:
                 "serial://?serial_number=…",
                 exchanges=self._line.link.recent(),
             )
+
+    async def _read_twice(self, number: int) -> str:
+        """Read once more if no answer comes: a drive of which nothing is known could not be told from another."""
+        try:
+            return await self._read(number)
+        except AnswerTimeoutError:
+            return await self._read(number)
 
     async def _read(self, number: int) -> str:
         return value_text(await self._line.query(f"S{number}", Lane.GREETING))
