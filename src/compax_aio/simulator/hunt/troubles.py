@@ -132,7 +132,7 @@ async def _blackout(far: Far, trouble: Trouble) -> None:
     far.line.cut()
     await asyncio.sleep(trouble.arguments["later_s"])
     far.drive.power_off()
-    await asyncio.sleep(trouble.lasts_s)
+    await asyncio.sleep(trouble.arguments["off_s"])
     far.drive.power_on()
     far.line.refused = False
 
@@ -255,7 +255,9 @@ TROUBLES: Final[Mapping[str, TroubleKind]] = {
     "cut": TroubleKind(2, _one_of(keeps=(False, False, True)), _cut, reconnecting=4),
     "flapping": TroubleKind(0, _one_of(times=(2, 3, 8), every_s=(0.01, 0.06, 0.3, 0.7)), _flapping, reconnecting=1),
     "half open": TroubleKind(1, _one_of(is_cut=(False, True)), _half_open, reconnecting=1.5),
-    "blackout": TroubleKind(0, _one_of(later_s=(0.0, 0.05, 0.5, 3.0)), _blackout, reconnecting=2),
+    "blackout": TroubleKind(
+        0, _one_of(later_s=(0.0, 0.05, 0.3), off_s=(0.0, 0.05, 0.3, 4.0)), _blackout, reconnecting=2
+    ),
     "stranger": TroubleKind(
         0,
         _one_of(position=(4321.0, 8765.0), fault=(None, None, 20), says=(b"", b"$\r\n>", b"$\r\n>", b"1\r\n>")),
