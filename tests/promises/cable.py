@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import AsyncIterator, Awaitable
+from contextlib import asynccontextmanager
+from typing import Any
 
-from compax_aio.simulator.compax import SimulatedDrive
+import compax_aio
+from compax_aio import CompaxError, Drive, DriveSettings
+from compax_aio.simulator.compax import Knobs, SimulatedDrive
 from compax_aio.simulator.line import Connection, DeviceLine
 from compax_aio.transports.loopback import LoopbackListener, listen
 
-__all__ = ["Cable"]
+__all__ = ["Cable", "connected", "outage", "outcome"]
+
+_SOON_S = 100.0
+"""Longer than anything may take that is awaited, with the settings' defaults."""
 
 
 class End(Connection):
@@ -73,6 +81,11 @@ class Cable:
             self.forgotten.add(connection)
             connection._line.disconnect()
 
+    @property
+    def is_plugged(self) -> bool:
+        """Whether it leads to a drive."""
+        return self._listener is not None
+
     async def pull(self) -> None:
         """Lose the line, and let nobody connect."""
         assert self._listener is not None
@@ -83,3 +96,41 @@ class Cable:
             connection.abort()
         await asyncio.sleep(0)
         await asyncio.sleep(0)
+
+
+@asynccontextmanager
+async def connected(
+    settings: DriveSettings | None = None, *, may_fail_to_close: bool = False, **knobs: Any
+) -> AsyncIterator[tuple[Drive, SimulatedDrive, Cable]]:
+    """Connect to a simulated drive over a cable; *may_fail_to_close* where the test leaves it in trouble."""
+    far, cable = SimulatedDrive(Knobs(**knobs), name="x"), Cable()
+    await cable.plug(far)
+    drive = await compax_aio.connect(cable.url, name="x", settings=settings)
+    try:
+        yield drive, far, cable
+    finally:
+        try:
+            await drive.close()
+        except CompaxError:
+            if not may_fail_to_close:
+                raise
+        if cable.is_plugged or not may_fail_to_close:
+            await cable.pull()
+
+
+async def outage(cable: Cable, far: SimulatedDrive, seconds: float, *, power_cycle: bool = False) -> None:
+    """Pull the cable for so long, and perhaps switch the drive off and on meanwhile."""
+    await cable.pull()
+    await asyncio.sleep(seconds)
+    if power_cycle:
+        far.power_cycle()
+    await cable.plug(far)
+
+
+async def outcome(work: Awaitable[Any], at_most_s: float = _SOON_S) -> Any:
+    """Return the result of *work*, or the CompaxError that it ends with; it must end in time."""
+    async with asyncio.timeout(at_most_s):
+        try:
+            return await work
+        except CompaxError as error:
+            return error

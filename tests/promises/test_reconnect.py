@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Awaitable
-from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
@@ -13,7 +12,6 @@ import compax_aio
 from compax_aio import (
     AnswerTimeoutError,
     ConnectionLostError,
-    Drive,
     DriveFaultError,
     DriveSettings,
     MoveInDoubtError,
@@ -21,32 +19,12 @@ from compax_aio import (
     UnexpectedAnswerError,
 )
 from compax_aio.compax.events import ConnectionLost, ConnectionRestored, DriveEvent
-from compax_aio.simulator.compax import Knobs, SimulatedDrive
+from compax_aio.simulator.compax import SimulatedDrive
 
 from .bench import ending, lines, motions, now, until
-from .cable import Cable
+from .cable import Cable, connected, outage
 
 pytestmark = pytest.mark.usefixtures("nothing_left_behind")
-
-
-@asynccontextmanager
-async def connected(
-    settings: DriveSettings | None = None, **knobs: Any
-) -> AsyncIterator[tuple[Drive, SimulatedDrive, Cable]]:
-    far, cable = SimulatedDrive(Knobs(**knobs), name="x"), Cable()
-    await cable.plug(far)
-    drive = await compax_aio.connect(cable.url, name="x", settings=settings)
-    try:
-        yield drive, far, cable
-    finally:
-        await drive.close()
-        await cable.pull()
-
-
-async def outage(cable: Cable, far: SimulatedDrive, seconds: float) -> None:
-    await cable.pull()
-    await asyncio.sleep(seconds)
-    await cable.plug(far)
 
 
 async def seen(events: AsyncIterator[DriveEvent], count: int) -> list[DriveEvent]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import gc
-from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import asynccontextmanager, suppress
+from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -34,47 +34,13 @@ from compax_aio.transports import registry
 from compax_aio.transports.loopback import listen
 
 from .bench import PROMPT, ScriptedDrive, is_moving, lines, motions, now, until
-from .cable import Cable
+from .cable import Cable, connected, outage, outcome
+
+lenient = partial(connected, may_fail_to_close=True)
 
 pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
-SOON_S: Final = 100.0
-"""Longer than anything may take that is awaited, with the settings' defaults."""
-
 MARKERS_TOO: Final[dict[str, str | None]] = {f"S{number}": f"S{number:03}: 0.00" for number in range(1, 13)}
-
-
-@asynccontextmanager
-async def connected(
-    settings: DriveSettings | None = None, **knobs: Any
-) -> AsyncIterator[tuple[Drive, SimulatedDrive, Cable]]:
-    far, cable = SimulatedDrive(Knobs(**knobs), name="x"), Cable()
-    await cable.plug(far)
-    drive = await compax_aio.connect(cable.url, name="x", settings=settings)
-    try:
-        yield drive, far, cable
-    finally:
-        with suppress(CompaxError):
-            await drive.close()
-        if cable._listener is not None:
-            await cable.pull()
-
-
-async def outage(cable: Cable, far: SimulatedDrive, seconds: float, *, power_cycle: bool = False) -> None:
-    await cable.pull()
-    await asyncio.sleep(seconds)
-    if power_cycle:
-        far.power_cycle()
-    await cable.plug(far)
-
-
-async def outcome(work: Awaitable[Any], at_most_s: float = SOON_S) -> Any:
-    """Return the result of *work*, or the CompaxError that it ends with; it must end in time."""
-    async with asyncio.timeout(at_most_s):
-        try:
-            return await work
-        except CompaxError as error:
-            return error
 
 
 def instances(*kinds: type) -> int:
@@ -251,7 +217,7 @@ async def test_an_opener_that_fails_in_its_own_way_once_is_tried_again(
 
 
 async def test_a_line_that_led_nowhere_and_is_then_lost_is_opened_once() -> None:
-    async with connected() as (drive, far, cable):
+    async with lenient() as (drive, far, cable):
         cable.half_open = True
         while drive._line.link._silence is None:
             assert isinstance(await outcome(drive.position()), CompaxError)
@@ -273,7 +239,7 @@ async def test_a_line_that_led_nowhere_and_is_then_lost_is_opened_once() -> None
 
 
 async def test_a_query_that_came_while_a_hopeless_line_was_greeted_settles_when_that_is_lost_again() -> None:
-    async with connected(DriveSettings(in_doubt_after_s=3)) as (drive, far, cable):
+    async with lenient(DriveSettings(in_doubt_after_s=3)) as (drive, far, cable):
         await cable.pull()
         await asyncio.sleep(10)
         cable.half_open = True
@@ -303,7 +269,7 @@ async def test_a_query_whose_answer_always_loses_the_line_settles() -> None:
 
 async def test_a_stop_that_was_acknowledged_before_the_line_was_lost_ends_in_its_own_time() -> None:
     settings = DriveSettings(stop_timeout_s=2, standstill_timeout_s=3)
-    async with connected(settings, stop_ramp_ms=60_000) as (drive, _, cable):
+    async with lenient(settings, stop_ramp_ms=60_000) as (drive, _, cable):
         move = drive.move_to(100_000)
         await move.accepted
         await asyncio.sleep(10)
@@ -317,7 +283,7 @@ async def test_a_stop_that_was_acknowledged_before_the_line_was_lost_ends_in_its
 
 
 async def test_a_drive_that_was_off_for_long_is_there_soon_after_it_is_back() -> None:
-    async with connected() as (drive, far, cable):
+    async with lenient() as (drive, far, cable):
         await cable.pull()
         far.power_off()
         await cable.plug(far)
@@ -329,7 +295,7 @@ async def test_a_drive_that_was_off_for_long_is_there_soon_after_it_is_back() ->
 
 
 async def test_a_limited_number_of_attempts_counts_for_each_loss() -> None:
-    async with connected(DriveSettings(reconnect_attempts=1, reconnect_first_s=0.1)) as (drive, far, cable):
+    async with lenient(DriveSettings(reconnect_attempts=1, reconnect_first_s=0.1)) as (drive, far, cable):
         for _ in range(3):
             await outage(cable, far, 0.01)
             await asyncio.sleep(1)
@@ -341,7 +307,7 @@ async def test_a_limited_number_of_attempts_counts_for_each_loss() -> None:
 
 
 async def test_a_fault_of_another_drive_is_not_told_as_ours() -> None:
-    async with connected() as (drive, far, cable):
+    async with lenient() as (drive, far, cable):
         events = drive.events()
         other = SimulatedDrive(name="other")
         other.raise_fault(55)
@@ -357,7 +323,7 @@ async def test_a_fault_of_another_drive_is_not_told_as_ours() -> None:
 
 
 async def test_a_message_of_another_drive_is_not_told_as_ours() -> None:
-    async with connected() as (drive, far, cable):
+    async with lenient() as (drive, far, cable):
         events = drive.events()
         other = SimulatedDrive(name="other")
         await cable.pull()
@@ -378,7 +344,7 @@ async def test_a_message_of_another_drive_is_not_told_as_ours() -> None:
 async def test_another_drive_that_was_looked_at_meanwhile_neither_hides_nor_fakes_a_restart(
     other_is_homed: bool,
 ) -> None:
-    async with connected() as (drive, far, cable):
+    async with lenient() as (drive, far, cable):
         if not other_is_homed:
             await drive.home()
         other, other_cable = SimulatedDrive(name="other"), Cable("other")
@@ -401,7 +367,7 @@ async def test_another_drive_that_was_looked_at_meanwhile_neither_hides_nor_fake
 
 
 async def test_a_stop_that_another_drive_has_acknowledged_is_still_said_to_ours() -> None:
-    async with connected() as (drive, far, cable):
+    async with lenient() as (drive, far, cable):
         move = drive.move_to(1_000_000)
         await move.accepted
         await cable.pull()
@@ -424,7 +390,7 @@ async def test_a_stop_that_another_drive_has_acknowledged_is_still_said_to_ours(
 
 @pytest.mark.parametrize("cut_at", ["S16", "P20", "S31", "S39", "S18"])
 async def test_a_restart_is_noticed_although_the_greeting_that_showed_it_was_cut(cut_at: str) -> None:
-    async with connected() as (drive, far, cable):
+    async with lenient() as (drive, far, cable):
         far.raise_fault(55)
         await drive.status()
         await drive.quit()
@@ -471,7 +437,7 @@ async def test_a_drive_that_was_switched_off_is_not_told_to_have_reached_zero() 
 
 
 async def test_a_program_whose_drive_was_switched_off_is_not_told_as_finished() -> None:
-    async with connected() as (drive, far, cable):
+    async with lenient() as (drive, far, cable):
         await drive.home()
         await drive.program.download("N001: POSA 5000\nN002: END")
         await drive.program.start(1)
@@ -483,7 +449,7 @@ async def test_a_program_whose_drive_was_switched_off_is_not_told_as_finished() 
 
 
 async def test_nothing_goes_in_binary_to_a_drive_that_does_not_take_it_any_more() -> None:
-    async with connected(DriveSettings(binary_settings=True), p20=16) as (drive, _, cable):
+    async with lenient(DriveSettings(binary_settings=True), p20=16) as (drive, _, cable):
         assert drive.interface is not None
         assert drive.interface.binary
         await drive.move_to(1, speed_percent=50)
@@ -497,7 +463,7 @@ async def test_nothing_goes_in_binary_to_a_drive_that_does_not_take_it_any_more(
 
 
 async def test_a_position_reached_message_that_comes_during_the_greeting_is_counted() -> None:
-    async with connected(answer_time_s=0.01) as (drive, far, cable):
+    async with lenient(answer_time_s=0.01) as (drive, far, cable):
         await drive.move_to(10)
         move = drive.move_to(110)
         await move.accepted
@@ -532,7 +498,7 @@ MOTIONS: Final[dict[str, Callable[[Drive], Awaitable[Any]]]] = {
 
 @pytest.mark.parametrize("what", MOTIONS)
 async def test_no_motion_that_was_commanded_while_the_line_was_lost_begins_when_it_is_back(what: str) -> None:
-    async with connected() as (drive, far, cable):
+    async with lenient() as (drive, far, cable):
         await drive.program.write(1, MoveTo(50))
         await cable.pull()
         commanded = asyncio.ensure_future(_awaited(MOTIONS[what](drive)))
@@ -548,7 +514,7 @@ async def _awaited(work: Awaitable[Any]) -> Any:
 
 
 async def test_a_half_open_line_is_opened_anew_before_a_move_on_it_is_in_doubt() -> None:
-    async with connected() as (drive, far, cable):
+    async with lenient() as (drive, far, cable):
         move = drive.move_to(100)
         await move.accepted
         cable.half_open = True
@@ -617,7 +583,7 @@ async def test_whatever_is_under_way_when_the_line_is_lost_ends_in_time_and_says
     what: str, power_cycle: bool
 ) -> None:
     for milliseconds in (1, 4, 9, 13, 22, 35, 48):
-        async with connected(answer_time_s=0.003) as (drive, far, cable):
+        async with lenient(answer_time_s=0.003) as (drive, far, cable):
             await drive.program.write(1, MoveTo(50))
             begun, said = len(motions(far)), len(lines(far))
             work = asyncio.ensure_future(_awaited(WORKS[what](drive)))
@@ -638,7 +604,7 @@ async def test_whatever_is_cancelled_while_its_line_is_lost_or_greeted_leaves_th
     what: str,
 ) -> None:
     for milliseconds in range(0, 700, 71):
-        async with connected(answer_time_s=0.003) as (drive, far, cable):
+        async with lenient(answer_time_s=0.003) as (drive, far, cable):
             await drive.program.write(1, MoveTo(5000))
             work = asyncio.ensure_future(_awaited(WORKS[what](drive)))
             await asyncio.sleep(0.03)
@@ -724,7 +690,7 @@ async def test_a_move_whose_line_breaks_at_any_byte_moves_at_most_once_and_its_f
 
 
 async def test_a_line_that_flaps_all_the_time_costs_no_memory() -> None:
-    async with connected(DriveSettings(reconnect_slowest_s=0.5)) as (drive, far, cable):
+    async with lenient(DriveSettings(reconnect_slowest_s=0.5)) as (drive, far, cable):
         for turn in range(600):
             reading = asyncio.ensure_future(_awaited(drive.position()))
             await cable.pull()
@@ -739,7 +705,7 @@ async def test_a_line_that_flaps_all_the_time_costs_no_memory() -> None:
 
 
 async def test_thousands_of_queries_that_are_given_up_while_the_line_is_lost_leave_nothing_behind() -> None:
-    async with connected() as (drive, far, cable):
+    async with lenient() as (drive, far, cable):
         await cable.pull()
         for _ in range(5000):
             with suppress(TimeoutError):
@@ -810,12 +776,12 @@ def _note(event: asyncio.Event, *_: int) -> None:
 async def test_a_restore_that_is_cut_says_exactly_what_the_drive_has(tmp_path: Path) -> None:
     path = tmp_path / "variables.toml"
     wanted = {number: float(number) for number in range(1, 7)}
-    async with connected() as (drive, _, _):
+    async with lenient() as (drive, _, _):
         for number, value in wanted.items():
             await drive.variables.write(number, value)
         await drive.variables.save(path)
     for milliseconds in range(40, 130, 9):
-        async with connected(answer_time_s=0.003) as (drive, far, cable):
+        async with lenient(answer_time_s=0.003) as (drive, far, cable):
             begun_at = now()
             first = asyncio.Event()
             work = asyncio.ensure_future(drive.variables.restore(path, on_progress=partial(_note, first)))
