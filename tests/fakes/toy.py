@@ -28,12 +28,20 @@ class ToyProtocol:
         self.in_doubt = True
         self.is_busy = False
         self.held: Hold | None = None
+        self.patience_s: float | None = None
         self._out = b""
         self._received = b""
         self._events: list[Event] = []
 
     def line_opened(self) -> None:
         self.in_doubt, self.is_busy = True, False
+
+    def line_lost(self) -> None:
+        self.in_doubt, self.is_busy = True, False
+
+    def preempt(self, text: str) -> None:
+        self.in_doubt, self.is_busy = True, False
+        self._out += text.encode() + b"\n"
 
     def send(self, text: str) -> None:
         assert not self.in_doubt

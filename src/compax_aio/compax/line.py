@@ -10,7 +10,7 @@ from typing import TypeVar
 from ..errors import AnswerTimeoutError, CommandRejectedError, ConnectionLostError, UnexpectedAnswerError
 from ..link.contract import Event, Lane, TurnOver
 from ..link.link import Link
-from ..link.reconnecting import Backoff, Reconnecting, Restored
+from ..link.reconnecting import Reconnecting, Restored
 from .codecs import DriveStatus, decode_number, shows_active
 from .facts.device_errors import device_error
 from .protocol import Acknowledged, Answered, CompaxProtocol, Rejected, UnexpectedAnswer
@@ -58,7 +58,11 @@ class DriveLine:
             on_event=on_event,
             on_lost=on_lost,
             greet=greet,
-            reconnecting=_reconnecting(name, settings, on_down, on_restored),
+            reconnecting=Reconnecting.by(settings, name, on_down, on_restored),
+            advice_on_silence=(
+                "check power, cable (crossed, not straight), port and baud rate, and the handshake lines; a device "
+                "that takes longer to answer wants more answer_timeout_s"
+            ),
         )
         self.last_position: float | None = None
         self.active_seen_at = -inf
@@ -175,19 +179,3 @@ class DriveLine:
             error.device = self.name
             error.exchanges = self.link.recent()
             raise
-
-
-def _reconnecting(
-    name: str,
-    settings: DriveSettings,
-    on_down: Callable[[ConnectionLostError], None],
-    on_restored: Callable[[Restored], None],
-) -> Reconnecting | None:
-    if not settings.reconnect:
-        return None
-    backoff = Backoff(
-        first_s=settings.reconnect_first_s,
-        slowest_s=settings.reconnect_slowest_s,
-        attempts=settings.reconnect_attempts,
-    )
-    return Reconnecting(name, backoff, settings.in_doubt_after_s, on_down, on_restored)

@@ -114,6 +114,11 @@ class CompaxProtocol:
         return self.state in BUSY
 
     @property
+    def patience_s(self) -> float | None:
+        """As long as any answer."""
+        return None
+
+    @property
     def held(self) -> Hold | None:
         """Why nothing but a stop may be sent: a binary motion was not answered, and half of it would wait for more."""
         if self.state not in HELD:
@@ -143,6 +148,11 @@ class CompaxProtocol:
         self._stops_answered = 0
         self._step(LineOpened())
 
+    def line_lost(self) -> None:
+        """Give up what is outstanding."""
+        if self.is_busy:
+            self._step(TimeRanOut())
+
     def send(self, text: str) -> None:
         """Begin the exchange of *text*, one line without its CR."""
         wire = self.encode(text)
@@ -164,6 +174,10 @@ class CompaxProtocol:
         """Send *text*, a stop, although in doubt; whatever comes next ends its turn and proves nothing."""
         self._step(SentAhead())
         self._write(text, encode_ascii(text))
+
+    def preempt(self, text: str) -> None:
+        """Refuse: a COMPAX heeds nothing while a line is outstanding."""
+        raise LinkProtocolError("a COMPAX can be told nothing out of turn", sent=text, hint="send STOP in its turn")
 
     def time_ran_out(self) -> None:
         """Give the outstanding line up; its answer, should it come, is late."""

@@ -9,6 +9,7 @@ from typing import Protocol
 __all__ = [
     "DeviceProtocol",
     "Event",
+    "GoesOn",
     "Hold",
     "HoldOver",
     "InStep",
@@ -16,12 +17,13 @@ __all__ = [
     "LateEnding",
     "MarkerSpent",
     "Stranger",
+    "TurnLost",
     "TurnOver",
 ]
 
 
 class Lane(IntEnum):
-    """What goes first when the line is free; inside a lane, first come first served."""
+    """What goes first when the line is free; inside a lane everybody who shares the line in turn, first come first."""
 
     STOP = 0
     GREETING = 1
@@ -39,6 +41,16 @@ class Event:
 @dataclass(frozen=True, slots=True)
 class TurnOver(Event):
     """The outstanding exchange is over; how, says the subclass. The device takes the next line."""
+
+
+@dataclass(frozen=True, slots=True)
+class TurnLost(TurnOver):
+    """The outstanding exchange is over without an answer, and none will come: it was cut short or never understood."""
+
+
+@dataclass(frozen=True, slots=True)
+class GoesOn(Event):
+    """What is outstanding has come a step further: from now on the device has its time anew."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,9 +96,11 @@ class DeviceProtocol(Protocol):
     """
     One device's line, sans-IO: commands in, bytes out, bytes in, events out.
 
-    The link calls the methods in turns: :meth:`send` when the line is in step and free; after :meth:`time_ran_out`
+    The link calls the methods in turns: :meth:`send` when the line is in step and free; after an exchange was given up
     or :meth:`line_opened` the line is in doubt, and only :meth:`send_marker` and :meth:`send_ahead` are allowed
-    until an :class:`InStep` event. While it is :attr:`held`, not even :meth:`send_marker` is.
+    until an :class:`InStep` event. While it is :attr:`held`, not even :meth:`send_marker` is. Only :meth:`preempt` is
+    allowed at any time. What an exchange is made of is the protocol's own matter: bytes may go out in reaction to
+    bytes, and after a pause.
     """
 
     @property
@@ -101,8 +115,15 @@ class DeviceProtocol(Protocol):
     def held(self) -> Hold | None:
         """Why nothing but what goes ahead may be sent, until that is answered, or :meth:`resume`; None if it may."""
 
+    @property
+    def patience_s(self) -> float | None:
+        """How long what is outstanding may take from now, answer or pause; None: as long as any answer on that line."""
+
     def line_opened(self) -> None:
         """Take note that the line is new: what stands in the device's buffer is unknown."""
+
+    def line_lost(self) -> None:
+        """Take note that the line is gone: nothing outstanding will be answered on it."""
 
     def send(self, text: str) -> None:
         """Begin the exchange of *text*; allowed when in step and not busy."""
@@ -113,8 +134,16 @@ class DeviceProtocol(Protocol):
     def send_ahead(self, text: str) -> None:
         """Send *text*, which does no harm when it comes twice, although in doubt; allowed when not busy."""
 
+    def preempt(self, text: str) -> None:
+        """Send *text*, which the device heeds at any time, though something is outstanding: that turn is over by it."""
+
     def time_ran_out(self) -> None:
-        """Give the outstanding exchange up: the line is in doubt, and its answer, if it comes, is late."""
+        """
+        Take note that :attr:`patience_s` is over.
+
+        The outstanding exchange is given up: the line is in doubt, and its answer, if it comes, is late. Or it was a
+        pause, and now that it is over something else happens.
+        """
 
     def resume(self) -> None:
         """Take a person's word that nothing that is sent can do harm now: the line is not held, but still in doubt."""

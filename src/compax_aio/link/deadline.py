@@ -13,23 +13,20 @@ class Deadline:
     Calls somebody when nothing has put it off for so long.
 
     Args:
-        after_s: From :meth:`put_off` to the call.
         when_over: What is called.
     """
 
-    def __init__(self, after_s: float, when_over: Callable[[], None]) -> None:
-        self._after_s = after_s
+    def __init__(self, when_over: Callable[[], None]) -> None:
         self._when_over = when_over
         self._loop = asyncio.get_running_loop()
-        self.counted_from = 0.0
-        """Loop time at which it was put off last."""
         self._at = 0.0
         self._timer: asyncio.TimerHandle | None = None
 
-    def put_off(self) -> None:
-        """Count from now."""
-        self.counted_from = self._loop.time()
-        self._at = self.counted_from + self._after_s
+    def put_off(self, by_s: float) -> None:
+        """Count *by_s* from now."""
+        self._at = self._loop.time() + by_s
+        if self._timer is not None and self._timer.when() > self._at:
+            self.cancel()
         if self._timer is None:
             self._timer = self._loop.call_at(self._at, self._wake)
 

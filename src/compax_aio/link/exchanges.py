@@ -1,10 +1,10 @@
-"""What waits for its turn on a line: exchanges in lanes, reads shared and, if need be, held back."""
+"""What waits for its turn on a line: exchanges in lanes, who shares the line in turn, reads shared and held back."""
 
 from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Container, Iterator
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -31,6 +31,8 @@ class Exchange:
     queued_at: float = 0.0
     """Loop time."""
     on_sent: Callable[[], None] | None = None
+    party: str = ""
+    """Whose it is, of those who share the line."""
     waiters: list[asyncio.Future[TurnOver]] = field(default_factory=list)
     times_ahead: int = 0
     """How often it was sent although in doubt."""
@@ -72,15 +74,43 @@ class Exchange:
                 waiter.set_exception(make_error(self))
 
 
+class _Waiting:
+    """One lane: those who share the line take turns, and each one's exchanges go in the order in which they came."""
+
+    def __init__(self) -> None:
+        self._of: dict[str, deque[Exchange]] = {}
+
+    def __iter__(self) -> Iterator[Exchange]:
+        return (exchange for waiting in self._of.values() for exchange in waiting)
+
+    def append(self, exchange: Exchange) -> None:
+        self._of.setdefault(exchange.party, deque()).append(exchange)
+
+    def popleft(self, held: Container[str]) -> Exchange | None:
+        party = next((party for party in self._of if party not in held), None)
+        if party is None:
+            return None
+        waiting = self._of.pop(party)
+        exchange = waiting.popleft()
+        if waiting:
+            self._of[party] = waiting  # behind the others
+        return exchange
+
+    def clear(self) -> None:
+        self._of.clear()
+
+
 class ExchangeQueue:
-    """Lanes, the most urgent first; inside a lane first come, first served."""
+    """Lanes, the most urgent first; inside a lane everybody on the line in turn, and first come, first served."""
 
     def __init__(self) -> None:
         self.reads_are_held = False
         """While set, reads stay where they are; everything else goes on."""
+        self.held: set[str] = set()
+        """Of those who share the line, whose exchanges stay where they are."""
         self.is_admitted = True
         """Unless set, nothing goes that is less urgent than the look at who is there."""
-        self._lanes: tuple[deque[Exchange], ...] = tuple(deque() for _ in Lane)
+        self._lanes: tuple[_Waiting, ...] = tuple(_Waiting() for _ in Lane)
         self._reads: dict[str, Exchange] = {}
 
     def put(self, exchange: Exchange) -> None:
@@ -98,8 +128,7 @@ class ExchangeQueue:
             if (lane is Lane.READ and self.reads_are_held) or (lane > Lane.GREETING and not self.is_admitted):
                 return None
             waiting = self._lanes[lane]
-            while waiting:
-                exchange = waiting.popleft()
+            while (exchange := waiting.popleft(self.held)) is not None:
                 if lane is Lane.READ:
                     del self._reads[exchange.text]
                 if exchange.is_wanted:
@@ -108,7 +137,8 @@ class ExchangeQueue:
 
     def first_stop(self) -> Exchange | None:
         """Find the stop that goes first, and leave it where it is."""
-        return next((exchange for exchange in self._lanes[Lane.STOP] if exchange.is_wanted), None)
+        stops = self._lanes[Lane.STOP]
+        return next((exchange for exchange in stops if exchange.is_wanted and exchange.party not in self.held), None)
 
     def take_all(self) -> list[Exchange]:
         """Take out everything, the most urgent first."""

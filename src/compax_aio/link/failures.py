@@ -21,13 +21,17 @@ class Failures:
         history: Its last bytes, told in every error.
         answer_timeout_s: How long an answer may take.
         resync_attempts: How many markers are tried.
+        advice_on_silence: What to look at when nothing comes at all.
     """
 
-    def __init__(self, name: str, history: WireHistory, answer_timeout_s: float, resync_attempts: int) -> None:
+    def __init__(
+        self, name: str, history: WireHistory, answer_timeout_s: float, resync_attempts: int, advice_on_silence: str
+    ) -> None:
         self._name = name
         self._history = history
         self._answer_timeout_s = answer_timeout_s
         self._resync_attempts = resync_attempts
+        self._advice_on_silence = advice_on_silence
 
     def timeout(self, exchange: Exchange) -> AnswerTimeoutError:
         """Say that one line was not answered in time."""
@@ -51,8 +55,7 @@ class Failures:
             hint=(
                 "what comes is no answer of this device: check baud rate and parity, and which device this is"
                 if received
-                else "check power, cable (crossed, not straight), port and baud rate, and the handshake lines; a "
-                "device that takes longer to answer wants more answer_timeout_s"
+                else self._advice_on_silence
             ),
             exchanges=self._history.lines(),
         )

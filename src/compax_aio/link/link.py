@@ -73,6 +73,7 @@ class Link(asyncio.Protocol):
         greet: Awaited on every line that was opened and is in step, before anything goes over it that is less urgent
             than ``Lane.GREETING``: looks who is there, and raises CompaxError if it is not who it should be.
         reconnecting: How a line that was lost is opened again; None: it is not.
+        advice_on_silence: What a person should look at when nobody answers at all.
     """
 
     def __init__(
@@ -86,12 +87,13 @@ class Link(asyncio.Protocol):
         on_lost: Callable[[ConnectionLostError], None],
         greet: Callable[[], Awaitable[None]] | None = None,
         reconnecting: Reconnecting | None = None,
+        advice_on_silence: str = "check power, cable, port, baud rate and handshake",
     ) -> None:
         self.stats = LinkStats()
         self.history = WireHistory()
         self._protocol = protocol
         self._log = Seldom(logging.getLogger("compax_aio.link"), name)
-        self._failures = Failures(name, self.history, answer_timeout_s, resync_attempts)
+        self._failures = Failures(name, self.history, answer_timeout_s, resync_attempts, advice_on_silence)
         self._on_lost = on_lost
         self._greet = greet
         self._reconnecting = reconnecting
@@ -249,6 +251,7 @@ class Link(asyncio.Protocol):
         text: str,
         lane: Lane,
         *,
+        party: str = "",
         settles_late: bool = False,
         survives_loss: bool = False,
         on_sent: Callable[[], None] | None = None,
@@ -259,6 +262,7 @@ class Link(asyncio.Protocol):
         Args:
             text: The line without its end sign; checked by the caller.
             lane: What goes first. Identical lines that wait in ``Lane.READ`` share one exchange.
+            party: Whose it is, where several share the line: in one lane they take turns.
             settles_late: After a time-out, wait until the line is in step again, for the answer may come late; where
                 nothing may be sent to get in step, only as long as an answer may take, once more.
             survives_loss: Wait for a line that is lost, and send it again when it is back; for what does no harm when
@@ -272,7 +276,7 @@ class Link(asyncio.Protocol):
         waiter: asyncio.Future[TurnOver] = self._loop.create_future()
         survives_loss &= lane is not Lane.GREETING
         exchange = Exchange(
-            text, lane, settles_late, survives_loss, self._attempts, self._loop.time(), on_sent, [waiter]
+            text, lane, settles_late, survives_loss, self._attempts, self._loop.time(), on_sent, party, [waiter]
         )
         if self._silence is not None and not self.is_over:
             if lane is Lane.STOP:
@@ -289,9 +293,29 @@ class Link(asyncio.Protocol):
             return not self.is_over
         return exchange.survives_loss and self._reconnecting is not None
 
+    def preempt(self, text: str) -> None:
+        """
+        Write *text*, which the device heeds at any time, at once; what is outstanding is over by it.
+
+        Raises:
+            ConnectionLostError: There is no line; nothing was sent.
+        """
+        if not self._port.is_there or self.is_over:
+            raise self._lost(None)
+        self._turns.preempt(text)
+
     def hold_reads(self, for_s: float) -> None:
         """Let what waits in ``Lane.READ`` wait on, at most *for_s* from now; what is on the wire goes on."""
         self._turns.hold_reads(for_s)
+
+    def hold(self, party: str) -> None:
+        """Let what *party* has to say wait on, stops too, until :meth:`release`; what is on the wire goes on."""
+        self._turns.queue.held.add(party)
+
+    def release(self, party: str) -> None:
+        """Let what *party* has to say go on; harmless when it is not held."""
+        self._turns.queue.held.discard(party)
+        self._turns.pump()
 
     def release_reads(self) -> None:
         """Let reads go on; harmless when they are not held back."""

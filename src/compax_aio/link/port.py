@@ -70,12 +70,12 @@ class Port:
         if self._end is not None and not self._end.done():
             self._end.set_result(None)
 
-    def write(self, data: bytes) -> None:
-        """Hand *data* to the transport, if there is one."""
+    def write(self, data: bytes, *, goes_on: bool = False) -> None:
+        """Hand *data* to the transport, if there is one; *goes_on* with what was written before, or begin a line."""
         if self._transport is None:
             return
         self._stats.bytes_sent += len(data)
-        self._history.sent(self._loop.time(), data)
+        self._history.sent(self._loop.time(), data, goes_on=goes_on)
         if _wire_log.isEnabledFor(logging.DEBUG):
             _wire_log.debug("%s → %s", self._name, readable(data))
         self._transport.write(data)

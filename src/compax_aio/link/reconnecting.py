@@ -12,7 +12,7 @@ from typing import Final, Protocol
 from ..errors import CompaxError, ConnectionLostError
 from .seldom import Seldom
 
-__all__ = ["Backoff", "LostLine", "Reconnecting", "Restored"]
+__all__ = ["Backoff", "LostLine", "ReconnectSettings", "Reconnecting", "Restored"]
 
 _GROWTH: Final = 2.0
 _LEAST_SHARE: Final = 0.5
@@ -67,6 +67,30 @@ class LostLine(Protocol):
         """Take note that it is not tried any more; *error* is that of the last attempt."""
 
 
+class ReconnectSettings(Protocol):
+    """What a user says of it."""
+
+    @property
+    def reconnect(self) -> bool:
+        """Whether a line is opened again at all."""
+
+    @property
+    def reconnect_first_s(self) -> float:
+        """See :class:`Backoff`."""
+
+    @property
+    def reconnect_slowest_s(self) -> float:
+        """See :class:`Backoff`."""
+
+    @property
+    def reconnect_attempts(self) -> int | None:
+        """See :class:`Backoff`."""
+
+    @property
+    def in_doubt_after_s(self) -> float:
+        """How long a lost line is waited for."""
+
+
 class Reconnecting:
     """
     Opens one line again whenever it is lost.
@@ -104,6 +128,24 @@ class Reconnecting:
         self._is_over = False
         self._task: asyncio.Task[None] | None = None
         self._timer: asyncio.TimerHandle | None = None
+
+    @classmethod
+    def by(
+        cls,
+        settings: ReconnectSettings,
+        name: str,
+        on_down: Callable[[ConnectionLostError], None],
+        on_restored: Callable[[Restored], None],
+    ) -> Reconnecting | None:
+        """Make one as *settings* say; None if the line is not to be opened again."""
+        if not settings.reconnect:
+            return None
+        backoff = Backoff(
+            first_s=settings.reconnect_first_s,
+            slowest_s=settings.reconnect_slowest_s,
+            attempts=settings.reconnect_attempts,
+        )
+        return cls(name, backoff, settings.in_doubt_after_s, on_down, on_restored)
 
     def begin(self, line: LostLine, error: ConnectionLostError, *, at_once: bool) -> None:
         """Try to get *line* back, which was lost with *error*, until it is there or given up; *at_once* or soon."""

@@ -22,6 +22,8 @@ class LinkStats:
     """Lines answered in their turn."""
     timeouts: int = 0
     """Lines whose answer did not come in time."""
+    lost_turns: int = 0
+    """Lines that were cut short, by the device or from here, and have no answer."""
     resynchronisations: int = 0
     """Times the line was brought back in step, the first after opening included."""
     reconnects: int = 0

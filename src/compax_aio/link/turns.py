@@ -13,7 +13,18 @@ from collections.abc import Callable
 from functools import partial
 
 from ..errors import CompaxError
-from .contract import DeviceProtocol, Event, HoldOver, InStep, Lane, LateEnding, MarkerSpent, TurnOver
+from .contract import (
+    DeviceProtocol,
+    Event,
+    GoesOn,
+    HoldOver,
+    InStep,
+    Lane,
+    LateEnding,
+    MarkerSpent,
+    TurnLost,
+    TurnOver,
+)
 from .deadline import Deadline
 from .exchanges import Exchange, ExchangeQueue
 from .failures import Failures
@@ -83,7 +94,8 @@ class Turns:
         self._may_send_ahead = False
         self._is_reading = False
         self._is_ended = False
-        self._deadline = Deadline(answer_timeout_s, self._time_is_up)
+        self._deadline = Deadline(self._time_is_up)
+        self._began_at = 0.0
         self._grace: asyncio.TimerHandle | None = None
 
     # What the link does ---------------------------------------------------------------------------------------------
@@ -119,14 +131,8 @@ class Turns:
     def receive(self, data: bytes) -> None:
         """Pass bytes in, events out."""
         self._protocol.receive(data)
-        self._flush()
-        # Nothing new is sent until every event is dealt with: a turn that began in between would get their answers.
-        self._is_reading = True
-        try:
-            for event in self._protocol.events():
-                self._handle(event)
-        finally:
-            self._is_reading = False
+        self._flush(goes_on=True)
+        self._take_events()
         if self._is_pursuing and self._protocol.stranger(time_is_over=False) is not None:
             self._give_up()
         self.pump()
@@ -134,8 +140,7 @@ class Turns:
     def line_lost(self) -> None:
         """Give up what is outstanding: nobody will answer it on this line."""
         self._deadline.cancel()
-        if self._protocol.is_busy:
-            self._protocol.time_ran_out()
+        self._protocol.line_lost()
         self.release_reads()
 
     def admit(self) -> None:
@@ -145,6 +150,14 @@ class Turns:
             exchange.end(outcome)
         self._unproved.clear()
         self.pump()
+
+    def preempt(self, text: str) -> None:
+        """Write *text*, which the device heeds at any time; what is outstanding is over by it."""
+        self._protocol.preempt(text)
+        self._flush()
+        self._take_events()
+        self._begin_doubt()
+        self._give_time()
 
     def end(self) -> None:
         """Send nothing any more."""
@@ -191,26 +204,36 @@ class Turns:
                 protocol.send(exchange.text)
                 exchange.is_on_wire = True
                 self._flush()
-                self._deadline.put_off()
+                self._began_at = self._loop.time()
+                self._give_time()
                 if exchange.on_sent is not None:
                     exchange.on_sent()
             else:
                 return
 
-    def _flush(self) -> None:
+    def _flush(self, *, goes_on: bool = False) -> None:
         if data := self._protocol.bytes_to_send():
-            self.lines_sent += 1
-            self._port.write(data)
+            self.lines_sent += not goes_on
+            self._port.write(data, goes_on=goes_on)
+
+    def _give_time(self) -> None:
+        patience_s = self._protocol.patience_s
+        self._deadline.put_off(self._answer_timeout_s if patience_s is None else patience_s)
+
+    def _take_events(self) -> None:
+        # Nothing new is sent until every event is dealt with: a turn that began in between would get their answers.
+        self._is_reading = True
+        try:
+            for event in self._protocol.events():
+                self._handle(event)
+        finally:
+            self._is_reading = False
 
     def _handle(self, event: Event) -> None:
         if isinstance(event, TurnOver):
-            exchange, self._outstanding = self._outstanding, None
-            self._stats.exchanges += 1
-            self._stats.answer_times_s.append(self._loop.time() - self._deadline.counted_from)
-            if self._protocol.in_doubt:
-                self._begin_doubt()
-            if exchange is not None:
-                self._end(exchange, event)
+            self._turn_is_over(event)
+        elif isinstance(event, GoesOn):
+            self._give_time()
         elif isinstance(event, LateEnding):
             self._stats.late_answers += 1
             self._log.tell(logging.INFO, "the answer to %r came late", event.sent)
@@ -226,6 +249,21 @@ class Turns:
         elif not isinstance(event, MarkerSpent):
             self._ensure_doubt_is_pursued()
             self._on_event(event)
+
+    def _turn_is_over(self, outcome: TurnOver) -> None:
+        exchange, self._outstanding = self._outstanding, None
+        self._count(outcome)
+        if self._protocol.in_doubt:
+            self._begin_doubt()
+        if exchange is not None:
+            self._end(exchange, outcome)
+
+    def _count(self, outcome: TurnOver) -> None:
+        if isinstance(outcome, TurnLost):
+            self._stats.lost_turns += 1
+        else:
+            self._stats.exchanges += 1
+            self._stats.answer_times_s.append(self._loop.time() - self._began_at)
 
     def _end(self, exchange: Exchange, outcome: TurnOver) -> None:
         if exchange.lane is Lane.STOP and not self.queue.is_admitted:
@@ -266,7 +304,7 @@ class Turns:
             self._may_send_ahead = True
             self._protocol.send_marker()
         self._flush()
-        self._deadline.put_off()
+        self._give_time()
         return True
 
     def _send_ahead(self, stop: Exchange) -> None:
@@ -324,22 +362,31 @@ class Turns:
     # Time -----------------------------------------------------------------------------------------------------------
 
     def _time_is_up(self) -> None:
-        if not self._protocol.is_busy:
+        was_busy = self._protocol.is_busy
+        if not was_busy:
             return
         self._protocol.time_ran_out()
-        if self._outstanding is not None:
-            self._stats.timeouts += 1
-            exchange, self._outstanding = self._outstanding, None
-            self._log.tell(logging.WARNING, "no answer to %r within %g s", exchange.text, self._answer_timeout_s)
-            exchange.is_late = True
-            self._doubtful = exchange
-            exchange.received = self._history.received_since_sent()
-            if not exchange.settles_late:
-                self._fail_doubtful()
-            self._begin_doubt()
-            if self._protocol.held is not None:
-                self._grace = self._loop.call_later(self._answer_timeout_s, self._grace_is_over)
+        self._flush(goes_on=True)
+        self._take_events()
+        if self._protocol.is_busy:  # that was a pause, and it goes on
+            self._give_time()
+        elif self._outstanding is not None:
+            self._give_outstanding_up(self._outstanding)
         self.pump()
+
+    def _give_outstanding_up(self, exchange: Exchange) -> None:
+        """Give up waiting for the answer to *exchange*: from now on it is late."""
+        self._stats.timeouts += 1
+        self._outstanding = None
+        self._log.tell(logging.WARNING, "no answer to %r within %g s", exchange.text, self._answer_timeout_s)
+        exchange.is_late = True
+        self._doubtful = exchange
+        exchange.received = self._history.received_since_sent()
+        if not exchange.settles_late:
+            self._fail_doubtful()
+        self._begin_doubt()
+        if self._protocol.held is not None:
+            self._grace = self._loop.call_later(self._answer_timeout_s, self._grace_is_over)
 
     def _grace_is_over(self) -> None:
         """Where nothing may be sent to get in step, a late answer is waited for no longer."""

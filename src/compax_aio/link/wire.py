@@ -24,8 +24,14 @@ class WireHistory:
     def __init__(self) -> None:
         self._entries: deque[tuple[float, str, bytes]] = deque(maxlen=_ENTRIES)
 
-    def sent(self, at: float, data: bytes) -> None:
-        """Note bytes that went out."""
+    def sent(self, at: float, data: bytes, *, goes_on: bool = False) -> None:
+        """Note bytes that went out; where they go on with what was sent before, beside its answer, they are joined."""
+        if goes_on:
+            for back in range(1, min(2, len(self._entries)) + 1):
+                first_at, arrow, before = self._entries[-back]
+                if arrow == "→":
+                    self._entries[-back] = (first_at, arrow, (before + data)[:_BYTES_AN_ENTRY])
+                    return
         self._entries.append((at, "→", data[:_BYTES_AN_ENTRY]))
 
     def received(self, at: float, data: bytes) -> None:
@@ -43,10 +49,8 @@ class WireHistory:
         return None
 
     def last_sent(self) -> str | None:
-        """Return what went out last, readable and without its CR; None if nothing did."""
-        return next(
-            (readable(data).removesuffix("␍") for _, arrow, data in reversed(self._entries) if arrow == "→"), None
-        )
+        """Return what went out last, readable and without its end sign; None if nothing did."""
+        return next((readable(data).rstrip("␍␊") for _, arrow, data in reversed(self._entries) if arrow == "→"), None)
 
     @property
     def has_received(self) -> bool:
