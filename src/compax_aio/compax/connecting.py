@@ -1,20 +1,17 @@
-"""Opening a drive's line: an awaitable that is an asynchronous context manager as well."""
+"""Opening a drive's line."""
 
 from __future__ import annotations
 
-from collections.abc import Generator
-from types import TracebackType
-from typing import Any
+from functools import partial
 
-from ..escaping import escaped
-from ..transports.url import TransportURL
+from ..motion.connecting import Connecting, name_of
 from .drive import Drive
 from .settings import DriveSettings
 
-__all__ = ["Connecting", "connect"]
+__all__ = ["connect"]
 
 
-def connect(url: str, *, name: str | None = None, settings: DriveSettings | None = None) -> Connecting:
+def connect(url: str, *, name: str | None = None, settings: DriveSettings | None = None) -> Connecting[Drive]:
     """
     Connect to one drive.
 
@@ -32,36 +29,4 @@ def connect(url: str, *, name: str | None = None, settings: DriveSettings | None
         UnexpectedAnswerError: Another device answers, such as a Compax3.
         AnswerTimeoutError: Nothing on it answers as a COMPAX would.
     """
-    if name is None:
-        shown = str(TransportURL.parse(url))
-        name = shown if "://?" in shown else shown.partition("?")[0]
-    name = escaped(name)
-    return Connecting(url, name, settings or DriveSettings())
-
-
-class Connecting:
-    """A connection about to be made: awaitable, and an asynchronous context manager."""
-
-    def __init__(self, url: str, name: str, settings: DriveSettings) -> None:
-        self._url = url
-        self._name = name
-        self._settings = settings
-        self._drive: Drive | None = None
-
-    def __await__(self) -> Generator[Any, None, Drive]:
-        return self._open().__await__()
-
-    async def __aenter__(self) -> Drive:
-        self._drive = await self._open()
-        return self._drive
-
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        assert self._drive is not None
-        await self._drive.close()
-
-    async def _open(self) -> Drive:
-        drive = Drive(self._name, self._settings)
-        await drive._open(self._url)  # noqa: SLF001 - the two halves of one class
-        return drive
+    return Connecting(url, partial(Drive, name_of(url, name), settings or DriveSettings()))

@@ -1,14 +1,10 @@
-"""What happens on a drive, as events that any number of consumers can follow without holding anybody up."""
+"""What happens on a drive: what any device's line does, and messages, comparators and faults of a COMPAX."""
 
 from __future__ import annotations
 
-import asyncio
-from collections import deque
-from collections.abc import AsyncIterator
 from dataclasses import dataclass
-from typing import Final
-from weakref import WeakSet
 
+from ..motion.events import ConnectionLost, ConnectionRestored, DriveEvent, EventHub, EventStream, UnexpectedText
 from .facts.device_errors import DeviceError
 
 __all__ = [
@@ -22,18 +18,6 @@ __all__ = [
     "PositionMessage",
     "UnexpectedText",
 ]
-
-_MAX_WAITING: Final = 1000
-
-
-@dataclass(frozen=True, slots=True)
-class DriveEvent:
-    """Something that a drive, or its line, did unasked."""
-
-    drive: str
-    """The drive's name."""
-    at: float
-    """The event loop's time, in seconds, when it was read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,98 +37,3 @@ class Fault(DriveEvent):
     """A status that was read shows a fault; *error* is None where the drive did not say which."""
 
     error: DeviceError | None
-
-
-@dataclass(frozen=True, slots=True)
-class ConnectionLost(DriveEvent):
-    """The line went away; it is tried again, unless ``DriveSettings.reconnect`` says otherwise."""
-
-    reason: str
-
-
-@dataclass(frozen=True, slots=True)
-class ConnectionRestored(DriveEvent):
-    """A line that was lost is back, and the same drive is on it, as far as it says who it is."""
-
-    lost_for_s: float
-    attempts: int
-    """How often the line was tried."""
-    signs_of_restart: tuple[str, ...]
-    """
-    What shows that the drive was switched off and on meanwhile; empty proves nothing.
-
-    Prepared points, SPEED, ramps and the position reference may be gone then. SPEED and ramps that were said from here
-    are said again before the next motion, in any case.
-    """
-
-
-@dataclass(frozen=True, slots=True)
-class UnexpectedText(DriveEvent):
-    """Something came that answers nothing: noise, a doubled answer, a text of another device."""
-
-    text: str
-
-
-class EventStream(AsyncIterator[DriveEvent]):
-    """
-    The events of one drive from now on; iterating ends when the drive is closed.
-
-    A consumer that is slow loses the oldest events, never memory; *lost* counts them.
-    """
-
-    def __init__(self) -> None:
-        self.lost = 0
-        self._waiting: deque[DriveEvent] = deque()
-        self._wake = asyncio.Event()
-        self._ended = False
-
-    def put(self, event: DriveEvent) -> None:
-        """Add *event*, in place of the oldest one if the consumer is too slow."""
-        if len(self._waiting) >= _MAX_WAITING:
-            self._waiting.popleft()
-            self.lost += 1
-        self._waiting.append(event)
-        self._wake.set()
-
-    def end(self) -> None:
-        """Let the consumer finish when it has read what waits."""
-        self._ended = True
-        self._wake.set()
-
-    def __aiter__(self) -> EventStream:
-        return self
-
-    async def __anext__(self) -> DriveEvent:
-        while not self._waiting:
-            if self._ended:
-                raise StopAsyncIteration
-            self._wake.clear()
-            await self._wake.wait()
-        return self._waiting.popleft()
-
-
-class EventHub:
-    """Passes every event to every stream; a stream that nobody holds any more is forgotten."""
-
-    def __init__(self) -> None:
-        self._streams: WeakSet[EventStream] = WeakSet()
-        self._ended = False
-
-    def stream(self) -> EventStream:
-        """Make a stream of the events from now on."""
-        stream = EventStream()
-        if self._ended:
-            stream.end()
-        self._streams.add(stream)
-        return stream
-
-    def publish(self, event: DriveEvent) -> None:
-        """Give *event* to all streams."""
-        for stream in self._streams:
-            stream.put(event)
-
-    def end(self) -> None:
-        """End all streams, and those to come."""
-        self._ended = True
-        for stream in self._streams:
-            stream.end()

@@ -9,7 +9,8 @@ from typing import Any, TypeVar
 
 from ..errors import InvalidCommandError, MoveStoppedError
 from ..link.cancellation import despite_cancellation
-from .connecting import Connecting, connect
+from ..motion.connecting import Connecting
+from .connecting import connect
 from .drive import Drive
 from .moves import Move, MoveResult, PreparedMove, fetch_error
 from .settings import DriveSettings
@@ -227,7 +228,7 @@ class DriveGroup:
         return GroupMove({axis: self.drives[axis].prepare(plan, timeout_s=timeout_s) for axis, plan in plans.items()})
 
 
-async def _open(connecting: Connecting) -> Drive:
+async def _open(connecting: Connecting[Drive]) -> Drive:
     return await connecting
 
 

@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 
+from ..checked_numbers import check_number
 from ..errors import (
     CommandRejectedError,
     CompaxError,
@@ -25,7 +26,6 @@ from .line import DriveLine
 from .plain_line import as_index, check_line
 from .value_file import read_file, write_file
 from .value_tables import ValueTable
-from .vocabulary import check_number
 
 __all__ = ["Difference", "NumberedValues", "Progress", "Restored"]
 

@@ -16,12 +16,12 @@ from types import MappingProxyType
 from typing import Any, Final
 from weakref import WeakValueDictionary
 
+from ..checked_numbers import check_number
 from ..errors import CommandRejectedError, CompaxError, ConnectionLostError, InvalidCommandError
 from .line import DriveLine
 from .parameters import NumberedValues
 from .readings import MAX_STATUS, Readings
 from .value_tables import PARAMETER_TABLE, VARIABLE_TABLE
-from .vocabulary import check_number
 from .watch import Reading, Watch
 
 __all__ = ["Poller"]

@@ -6,6 +6,7 @@ import asyncio
 from contextlib import suppress
 from typing import Final
 
+from ..checked_numbers import check_number
 from ..errors import (
     AnswerTimeoutError,
     CompaxError,
@@ -26,7 +27,6 @@ from .facts.program_commands import RECORD_NUMBERS
 from .motion import Motion
 from .observer import Observer
 from .plain_line import as_index, check_line
-from .vocabulary import check_number
 
 __all__ = ["ProgramRun", "check_record_number"]
 

@@ -21,12 +21,13 @@ from ..errors import (
     MoveInDoubtError,
 )
 from ..link.contract import Lane, TurnOver
+from ..motion.one_move import MustStop
+from ..motion.pace import Pace
 from .facts.device_errors import MOVE_ACTIVE_CODE
 from .facts.line import EXECUTE_SIGN, POSITION_REACHED_SIGN, STORE_SIGN
 from .memory import Memory
 from .moves import Move, PreparedMove
 from .observer import Look, Observer
-from .pace import Pace
 from .protocol import Acknowledged, MessageForm
 from .reports import Reports
 from .verdict import Verdict, judge
@@ -87,7 +88,8 @@ class Pursuit:
         Prepare, send, confirm; returns when the move has reached its target.
 
         Raises:
-            CompaxError: It has not; the error says why.
+            MustStop: It stands still although its command is active, or stands elsewhere.
+            CompaxError: It has not reached it; the error says why.
         """
         try:
             if isinstance(self.move, PreparedMove):
@@ -307,7 +309,7 @@ class Pursuit:
 
     async def _confirm(self) -> None:
         """Look at the status ever more rarely, and at once when something hints at the end."""
-        pace = Pace(self._settings, self._loop.time())
+        pace = self._pace()
         unclear = 0
         while not self.move.done():
             # Where the drive sends a message there is no hurry to look.
@@ -321,7 +323,7 @@ class Pursuit:
             self._refuse_after_restart(None)
             if self._line_was_lost:
                 self._line_was_lost = False
-                pace = Pace(self._settings, self._loop.time())  # nobody knows for how long it has stood still
+                pace = self._pace()  # nobody knows for how long it has stood still
             verdict = self._judge(look)
             if verdict is Verdict.UNCLEAR:
                 unclear += 1
@@ -334,7 +336,11 @@ class Pursuit:
             unclear = 0
             pace.note(look.position, self._loop.time())
             if pace.stood_still_s(self._loop.time()) >= self._settings.stall_timeout_s:
-                raise self._reports.stalled(self.move, look, self._settings.stall_timeout_s)
+                # Its command is active: it must not start later on.
+                raise MustStop(self._reports.stalled(self.move, look, self._settings.stall_timeout_s))
+
+    def _pace(self) -> Pace:
+        return Pace(self._settings.poll_first_s, self._settings.poll_slowest_s, self._loop.time())
 
     async def _pause(self, at_most_s: float) -> None:
         try:
@@ -392,7 +398,7 @@ class Pursuit:
         if verdict is Verdict.STOPPED:
             raise self._reports.stopped_by_others(self.move, look)
         if verdict is Verdict.UNCLEAR:
-            raise self._reports.not_arrived(self.move, look)
+            raise MustStop(self._reports.not_arrived(self.move, look))
         self._learn_message_form()
         self.move.finish("status", look.position)
 

@@ -1,17 +1,15 @@
-"""The errors that a move ends with: what happened, where the axis is, what to do next."""
+"""The errors that a move of a drive ends with: what happened, where the axis is, what to do next."""
 
 from __future__ import annotations
 
 from ..errors import (
-    CompaxError,
-    ConnectionLostError,
     DriveFaultError,
     MoveActiveError,
     MoveError,
-    MoveInDoubtError,
     MoveStoppedError,
     MoveTimeoutError,
 )
+from ..motion.reports import MoveReports
 from .facts.device_errors import DeviceError
 from .moves import Move, PreparedMove
 from .observer import Look, Observer
@@ -20,11 +18,15 @@ from .vocabulary import MovePlan
 __all__ = ["Reports"]
 
 
-class Reports:
+class Reports(MoveReports):
     """Writes the errors of one drive's moves."""
 
     def __init__(self, name: str, observer: Observer) -> None:
-        self._name = name
+        super().__init__(
+            name,
+            observer.line.link,
+            while_running="await it or stop it first; the drive would answer E92 (UG p. 162, 209)",
+        )
         self._observer = observer
 
     def speed_unknown(self, plan: MovePlan) -> MoveError:
@@ -44,46 +46,18 @@ class Reports:
             hint="home() cancels them (UG p. 101)",
         )
 
-    def running(self, move: Move, what: str) -> MoveActiveError:
-        """Report what was not sent because *move* runs."""
-        return MoveActiveError(
-            f"{move.plan.description} is running, so {what} was not sent",
-            device=self._name,
-            hint="await it or stop it first; the drive would answer E92 (UG p. 162, 209)",
-        )
-
-    def refused_in_doubt(self, what: str, doubt: str) -> MoveInDoubtError:
-        """Report what was not sent because something before it is in doubt."""
-        return MoveInDoubtError(
-            f"{what} was not sent, for {doubt}", device=self._name, hint="look at the machine, then call reconcile()"
-        )
-
     def not_ready(self, move: PreparedMove) -> MoveError:
         """Report a move that cannot be triggered."""
         is_too_late = move.readiness.done()
         why = "it has been triggered or has ended" if is_too_late else "the drive does not hold it ready yet"
         return MoveError(
-            f"{move.plan.description} was not triggered: {why}", device=self._name, hint="await move.ready before"
-        )
-
-    def withdrawn(self, move: Move) -> MoveStoppedError:
-        """Report a move that was stopped before its motion was sent."""
-        return MoveStoppedError(f"{move.plan.description} was stopped before it was sent", device=self._name)
-
-    def taken_back(self, text: str) -> MoveStoppedError:
-        """Report a line that was to start a motion, and that a stop has kept from being sent."""
-        return MoveStoppedError(f"{text!r} was stopped before it was sent", device=self._name)
-
-    def unwatched(self, move: Move) -> ConnectionLostError:
-        """Report a move that goes on although nobody watches it any more, as was asked for."""
-        return ConnectionLostError(
-            f"the line was closed; {move.plan.description} goes on unwatched", device=self._name, sent=move.sent
+            f"{move.description} was not triggered: {why}", device=self._name, hint="await move.ready before"
         )
 
     def stopped(self, move: Move, look: Look) -> MoveStoppedError:
         """Report a move that was stopped from here."""
         return MoveStoppedError(
-            f"{move.plan.description} was stopped at {self._observer.written(look.position)}",
+            f"{move.description} was stopped at {self._observer.written(look.position)}",
             device=self._name,
             sent=move.sent,
             received=look.as_sent,
@@ -93,7 +67,7 @@ class Reports:
     def moved_by_others(self, move: Move, look: Look) -> MoveActiveError:
         """Report a move that was not sent because the axis moves already."""
         return MoveActiveError(
-            f"somebody else moves this drive, so {move.plan.description} was not sent",
+            f"somebody else moves this drive, so {move.description} was not sent",
             device=self._name,
             received=look.as_sent,
             hint="wait or stop() first; the drive would answer E92 (UG p. 162, 209)",
@@ -103,7 +77,7 @@ class Reports:
         """Report a move that somebody else has stopped."""
         by = "by input I6" if look.status.stopped_by_input else "by somebody else"
         return MoveStoppedError(
-            f"{move.plan.description} was stopped {by} at {self._observer.written(look.position)}",
+            f"{move.description} was stopped {by} at {self._observer.written(look.position)}",
             device=self._name,
             sent=move.sent,
             received=look.as_sent,
@@ -113,7 +87,7 @@ class Reports:
     def not_arrived(self, move: Move, look: Look) -> MoveTimeoutError:
         """Report a move after which the drive stands still, elsewhere, and gives no reason."""
         return MoveTimeoutError(
-            f"{move.plan.description} ended at {self._observer.written(look.position)}, not at its target",
+            f"{move.description} ended at {self._observer.written(look.position)}, not at its target",
             device=self._name,
             sent=move.sent,
             received=look.as_sent,
@@ -123,7 +97,7 @@ class Reports:
     def stalled(self, move: Move, look: Look, seconds: float) -> MoveTimeoutError:
         """Report a move whose axis stands still although its command is active."""
         return MoveTimeoutError(
-            f"{move.plan.description} stood still at {self._observer.written(look.position)} for {seconds:g} s "
+            f"{move.description} stood still at {self._observer.written(look.position)} for {seconds:g} s "
             "with its command active, and was stopped",
             device=self._name,
             sent=move.sent,
@@ -131,20 +105,10 @@ class Reports:
             hint="find out what holds the axis; a longer stall_timeout_s waits longer",
         )
 
-    def out_of_time(self, move: Move, timeout_s: float) -> MoveTimeoutError:
-        """Report a move whose budget is used up."""
-        done = "was stopped" if move.is_on_wire else "was not sent"
-        return MoveTimeoutError(
-            f"{move.plan.description} was not at its target within {timeout_s:g} s and {done}",
-            device=self._name,
-            sent=move.sent,
-            hint="give it more time, or find out what holds it",
-        )
-
     def fault(self, move: Move, look: Look, error: DeviceError | None) -> DriveFaultError:
         """Report a move that a fault has ended."""
         which = f"E{error.code}, {error.meaning}" if error else "the drive does not say which"
-        what = f"a fault {'ended' if move.is_on_wire else 'forbids'} {move.plan.description}"
+        what = f"a fault {'ended' if move.is_on_wire else 'forbids'} {move.description}"
         return DriveFaultError(
             f"{what} at {self._observer.written(look.position)}: {which}",
             device=self._name,
@@ -152,18 +116,5 @@ class Reports:
             received=look.as_sent,
             hint=error.remedy if error else "read error_history(), mend the cause, then quit()",
             code=error.code if error else None,
-            exchanges=self._observer.line.link.recent(),
+            exchanges=self._link.recent(),
         )
-
-    def in_doubt(self, move: Move, why: str, cause: CompaxError | None) -> MoveInDoubtError:
-        """Report a move of which nobody can say what became of it."""
-        error = MoveInDoubtError(
-            f"what became of {move.plan.description} is in doubt: {why}",
-            device=self._name,
-            sent=move.sent,
-            received=cause.received if cause is not None else None,
-            hint="look at the machine, then call reconcile(); until then this drive takes no motion from here",
-            exchanges=self._observer.line.link.recent(),
-        )
-        error.__cause__ = cause
-        return error

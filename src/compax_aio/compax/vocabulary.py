@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from decimal import Decimal
-from math import isfinite
-from numbers import Real
 from typing import TypedDict, TypeVar
 
+from ..checked_numbers import check_number, written
 from ..errors import InvalidCommandError
 from ..escaping import shown
 from .facts.limits import (
@@ -28,7 +26,6 @@ __all__ = [
     "MovePlan",
     "SpeedStep",
     "change_of_speed",
-    "check_number",
     "check_travel",
     "plan_home",
     "plan_move_by",
@@ -123,13 +120,13 @@ def plan_move_to(
     """
     target = check_travel(_position("position", position, settings), settings)
     return MovePlan(
-        description=f"move_to({_written(target, settings.decimals)})",
+        description=f"move_to({written(target, settings.decimals)})",
         target=target,
         settings_lines=_settings_lines(settings, speed_percent, acceleration_ms, deceleration_ms),
         sets_speed=speed_percent is not None,
         point_lines=_point_lines(settings, steps, points := tuple(_all("comparators", comparators))),
         comparators=len(points),
-        motion=f"PA{_written(target, settings.decimals)}",
+        motion=f"PA{written(target, settings.decimals)}",
     )
 
 
@@ -156,13 +153,13 @@ def plan_move_by(
             "(UG p. 100)"
         )
     return MovePlan(
-        description=f"move_by({_written(rounded, settings.decimals)})",
+        description=f"move_by({written(rounded, settings.decimals)})",
         distance=rounded,
         settings_lines=_settings_lines(settings, speed_percent, acceleration_ms, deceleration_ms),
         sets_speed=speed_percent is not None,
         point_lines=_point_lines(settings, steps, points := tuple(_all("comparators", comparators))),
         comparators=len(points),
-        motion=f"PR{_written(rounded, settings.decimals)}",
+        motion=f"PR{written(rounded, settings.decimals)}",
     )
 
 
@@ -186,7 +183,7 @@ def check_travel(target: float, settings: DriveSettings) -> float:
     if settings.travel is not None and not settings.travel[0] <= target <= settings.travel[1]:
         low, high = (f"{limit:.{settings.decimals}f}" for limit in settings.travel)
         raise InvalidCommandError(
-            f"{_written(target, settings.decimals)} {settings.unit} lies outside the travel of the axis, "
+            f"{written(target, settings.decimals)} {settings.unit} lies outside the travel of the axis, "
             f"{low} to {high} (P11, P12, UG p. 100)",
             hint="the limits are those of read_axis() or DriveSettings.travel",
         )
@@ -239,7 +236,7 @@ def _settings_lines(
                 f"not {shown(speed_percent)}",
                 hint="DriveSettings.speed_limit_percent allows more, up to 600",
             )
-        lines.append(f"SD{_written(speed, SPEED_DECIMALS)}")
+        lines.append(f"SD{written(speed, SPEED_DECIMALS)}")
     if acceleration_ms is not None:
         lines.append(f"AL{_ramp_time('acceleration_ms', acceleration_ms)}")
     if deceleration_ms is not None:
@@ -305,7 +302,7 @@ def _point_distance(distance: float, settings: DriveSettings) -> str:
             f"the distance of a speed step or comparator counts from the start of the move and is positive "
             f"(UG p. 101), not {shown(distance)}"
         )
-    return _written(rounded, settings.decimals)
+    return written(rounded, settings.decimals)
 
 
 def _position(what: str, value: float, settings: DriveSettings) -> float:
@@ -323,27 +320,3 @@ def _ramp_time(what: str, value: int) -> int:
             f"not {shown(value)}"
         )
     return int(number)
-
-
-def check_number(what: str, value: object) -> float:
-    """
-    Return *value* as a float.
-
-    Raises:
-        InvalidCommandError: It is no number, or not finite; *what* names it.
-    """
-    if isinstance(value, bool) or not (isinstance(value, Real | Decimal)):
-        raise InvalidCommandError(f"{what} must be a number, not {shown(value)}")
-    try:
-        number = float(value)
-    except (OverflowError, ValueError):
-        raise InvalidCommandError(f"{what} must be finite and in range, not {shown(value)}") from None
-    if not isfinite(number):
-        raise InvalidCommandError(f"{what} must be finite, not {shown(value)}")
-    return number
-
-
-def _written(number: float, decimals: int) -> str:
-    """Write *number* as short as it goes: bytes on the wire are the cost."""
-    text = f"{number:.{decimals}f}".rstrip("0").rstrip(".")
-    return "0" if text == "-0" else text

@@ -1,32 +1,35 @@
-"""Motions of one drive that nobody watches: raw commands and programs, told at most once, taken back by a stop."""
+"""Motions that nobody watches, such as raw commands and programs: told at most once, taken back by a stop."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from functools import partial
+from typing import Any, Generic, TypeVar
 
 from ..link.contract import Lane
-from .line import DriveLine
-from .plain_line import is_positioning
-from .reports import Reports
+from .reports import MoveReports
 
 __all__ = ["Untracked"]
 
+_Answer = TypeVar("_Answer")
 
-class Untracked:
+
+class Untracked(Generic[_Answer]):
     """
     Knows whether a motion that nobody watches may be under way, and holds those that wait for their turn on the line.
 
     Args:
-        line: The drive's line.
-        reports: Of the same drive.
+        command: Sends a line, calls the function given when it is written, and raises unless the device takes it.
+        reports: Of the same drive or axis.
     """
 
-    def __init__(self, line: DriveLine, reports: Reports) -> None:
-        self._line = line
+    def __init__(
+        self, command: Callable[[str, Lane, Callable[[], None]], Coroutine[Any, Any, _Answer]], reports: MoveReports
+    ) -> None:
+        self._command = command
         self._reports = reports
-        self._waiting: set[asyncio.Task[None]] = set()
+        self._waiting: set[asyncio.Task[_Answer]] = set()
         self._count = 0
         self._under_way: dict[int, bool] = {}
         """By number, in the order of writing: whether it is a motion that ends before another can begin."""
@@ -50,19 +53,20 @@ class Untracked:
         self._under_way = {number: is_move for number, is_move in self._under_way.items() if number > mark}
 
     def note_moves_over(self, mark: int) -> None:
-        """Take note that the drive has taken a motion: those before *mark* have ended, programs may go on."""
+        """Take note that the device has taken a motion: those before *mark* have ended, programs may go on."""
         self._under_way = {
             number: is_move for number, is_move in self._under_way.items() if number > mark or not is_move
         }
 
-    async def tell(self, text: str) -> None:
-        """Send a motion, or what starts a program; see :meth:`say`."""
-        is_move, mark = is_positioning(text), self.mark()
-        await self.say(text, Lane.MOTION, partial(self.note, is_move=is_move))
+    async def tell(self, text: str, *, is_move: bool) -> _Answer:
+        """Send a motion that ends before another can begin (*is_move*), or what may go on; see :meth:`say`."""
+        mark = self.mark()
+        answer = await self.say(text, Lane.MOTION, partial(self.note, is_move=is_move))
         if is_move:
             self.note_moves_over(mark)
+        return answer
 
-    async def say(self, text: str, lane: Lane, on_sent: Callable[[], None]) -> None:
+    async def say(self, text: str, lane: Lane, on_sent: Callable[[], None]) -> _Answer:
         """
         Send one line, unless a stop comes before its turn on the line.
 
@@ -75,10 +79,10 @@ class Untracked:
             self._waiting.discard(saying)
             on_sent()
 
-        saying = asyncio.ensure_future(self._line.command(text, lane, written))
+        saying = asyncio.ensure_future(self._command(text, lane, written))
         self._waiting.add(saying)
         try:
-            await saying
+            return await saying
         except asyncio.CancelledError:
             task = asyncio.current_task()
             was_taken_back = saying in self._waiting and not (task is not None and task.cancelling())

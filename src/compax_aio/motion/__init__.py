@@ -1,0 +1,1 @@
+"""Moves of any device: awaited, watched, stopped and cancelled alike, whatever the device is told to make them."""
