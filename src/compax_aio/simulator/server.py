@@ -7,7 +7,7 @@ import os
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping
 from contextlib import AsyncExitStack, asynccontextmanager, contextmanager
 from pathlib import Path
-from typing import Any, Final, Protocol, runtime_checkable
+from typing import Any, Final, Protocol, TypeVar, runtime_checkable
 
 from compax_aio.errors import TransportError
 from compax_aio.transports.loopback import create_pair, listen
@@ -16,16 +16,19 @@ from compax_aio.transports.url import TransportURL
 
 from .compax.drive import SimulatedDrive
 from .compax.knobs import Knobs
-from .compax.state import read_state_file, write_state_file
 from .line import Connection, DeviceLine, SimulatedDevice
+from .smc.knobs import Knobs as LineKnobs
+from .smc.line import SimulatedPartyLine
+from .state_file import write_state_file
 
-__all__ = ["drive_named", "open_simulator", "serve_loopback", "serve_pty", "serve_tcp", "serve_tcp_group"]
+__all__ = ["drive_named", "line_named", "open_simulator", "serve_loopback", "serve_pty", "serve_tcp", "serve_tcp_group"]
 
 _FORM: Final = "sim://compax?name=x&answer_time_s=0.005"
 _NAME: Final = "name"
 _LAST_PORT: Final = 65_535
 
 _File = str | os.PathLike[str]
+_T = TypeVar("_T", SimulatedDrive, SimulatedPartyLine)
 
 
 @runtime_checkable
@@ -38,21 +41,25 @@ class _Lasting(Protocol):
     def load_state(self, state: Mapping[str, Any]) -> None:
         """Have kept that."""
 
+    def read_state_file(self, path: _File) -> dict[str, Any]:
+        """Read a file of a state."""
+
 
 async def open_simulator(url: TransportURL, protocol_factory: ProtocolFactory) -> asyncio.Transport:
     """
-    Open ``sim://compax?<knobs>``: a simulated drive in this process; each knob of the drive is an option.
+    Open ``sim://compax?<knobs>`` or ``sim://smc?<knobs>``: a simulated device in this process; each knob is an option.
 
-    With ``name=`` all URLs of that name in one event loop are the same drive, which lives on between connections;
+    With ``name=`` all URLs of that name in one event loop are the same device, which lives on between connections;
     without it each connection gets a new one.
 
     Raises:
-        TransportError: No such kind of device, no such knob or value, or somebody else is connected to that drive.
+        TransportError: No such kind of device, no such knob or value, or somebody else is connected to that device.
     """
     url.expect(_FORM, host=True, query=tuple(url.query))
     if url.host not in _KINDS:
         raise TransportError(f"there is no simulated {url.host!r}", hint=f"kinds of device: {', '.join(_KINDS)}")
-    line = DeviceLine.of(_KINDS[url.host](url.query))
+    query = {key: value for key, value in url.query.items() if key != _NAME}
+    line = DeviceLine.of(_KINDS[url.host](query, url.query.get(_NAME)))
     # A connection that has just been lost at this end is given back in the next turn of the loop.
     for _ in range(2):
         if line.occupied:
@@ -74,21 +81,23 @@ def drive_named(name: str, knobs: Knobs | None = None) -> SimulatedDrive:
         knobs: What the drive must be like; None: the default for a new one, and anything for one that exists.
 
     Raises:
-        TransportError: The drive exists and has other knobs.
+        TransportError: The drive exists and has other knobs, or a device of another kind has that name.
     """
-    loop = asyncio.get_running_loop()
-    for other in [each for each in _named if each.is_closed()]:
-        del _named[other]
-    drives = _named.setdefault(loop, {})
-    drive = drives.get(name)
-    if drive is None:
-        drive = drives[name] = SimulatedDrive(knobs, name=name)
-    elif knobs not in {None, drive.knobs}:
-        raise TransportError(
-            f"a simulated drive named {name!r} exists and has other knobs",
-            hint="give the knobs where it is opened first, and later its name alone",
-        )
-    return drive
+    return _named(SimulatedDrive, name, knobs)
+
+
+def line_named(name: str, knobs: LineKnobs | None = None) -> SimulatedPartyLine:
+    """
+    Return the line that ``sim://smc?name=...`` opens in the running event loop; it is made if there is none.
+
+    Args:
+        name: Any text.
+        knobs: What the line must be like; None: the default for a new one, and anything for one that exists.
+
+    Raises:
+        TransportError: The line exists and has other knobs, or a device of another kind has that name.
+    """
+    return _named(SimulatedPartyLine, name, knobs)
 
 
 @asynccontextmanager
@@ -212,8 +221,11 @@ def _kept(device: SimulatedDevice, file: _File | None) -> Iterator[None]:
     if not isinstance(device, _Lasting):
         raise TransportError(f"the simulated device {device.name!r} has no state to keep")
     path = Path(file)
-    if (state := _state_in(path)) is not None:
-        device.load_state(state)
+    if (state := _state_in(path, device)) is not None:
+        try:
+            device.load_state(state)
+        except ValueError as error:
+            raise TransportError(f"{path} holds no state of {device.name!r}: {error}") from error
     try:
         yield
     finally:
@@ -223,32 +235,33 @@ def _kept(device: SimulatedDevice, file: _File | None) -> Iterator[None]:
             raise TransportError(f"the state of {device.name!r} cannot be saved: {error}") from error
 
 
-def _state_in(path: Path) -> dict[str, Any] | None:
-    """Read a state; None if there is no file yet, and one can be made."""
+def _state_in(path: Path, device: _Lasting) -> dict[str, Any] | None:
+    """Read a state of *device*; None if there is no file yet, and one can be made."""
     if not path.parent.is_dir():
         raise TransportError(f"no state can be kept in {path}", hint=f"there is no folder {path.parent}")
     if not path.exists():
         return None
     try:
-        return read_state_file(path)
+        return device.read_state_file(path)
     except (OSError, ValueError) as error:
         raise TransportError(f"no state can be loaded: {error}", hint="mend the file, or take it away") from error
 
 
-def _files_in(folder: _File | None, names: Mapping[str, object]) -> Mapping[str, Path]:
+def _files_in(folder: _File | None, devices: Mapping[str, SimulatedDevice]) -> Mapping[str, Path]:
     """Return the file of each name, in a folder that is there; those that exist can be loaded."""
     if folder is None:
         return {}
-    for name in names:
+    for name in devices:
         if not name or name.startswith(".") or Path(name).name != name:
             raise TransportError(f"{name!r} can be no file name", hint="name the device otherwise, or keep no state")
     try:
         Path(folder).mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise TransportError(f"the folder {folder} cannot be used: {error}") from error
-    files = {name: Path(folder) / f"{name}.json" for name in names}
-    for file in files.values():
-        _state_in(file)
+    files = {name: Path(folder) / f"{name}.json" for name in devices}
+    for name, device in devices.items():
+        if isinstance(device, _Lasting):
+            _state_in(files[name], device)
     return files
 
 
@@ -258,13 +271,38 @@ async def _hang_up(connections: set[Connection]) -> None:
     await asyncio.sleep(0)  # in which their connection_lost is called
 
 
-def _compax(query: Mapping[str, str]) -> SimulatedDrive:
-    name = query.get(_NAME)
-    options = {key: value for key, value in query.items() if key != _NAME}
-    knobs = Knobs.from_query(options)
-    return SimulatedDrive(knobs) if name is None else drive_named(name, knobs if options else None)
+def _named(kind: Callable[..., _T], name: str, knobs: Any) -> _T:
+    """Return the device of that name in the running event loop, of that kind; it is made if there is none."""
+    loop = asyncio.get_running_loop()
+    for other in [each for each in _devices if each.is_closed()]:
+        del _devices[other]
+    devices = _devices.setdefault(loop, {})
+    device = devices.get(name)
+    if device is None:
+        device = devices[name] = kind(knobs, name=name)
+    elif type(device) is not kind:
+        raise TransportError(f"a simulated device of another kind is named {name!r}", hint="take another name")
+    elif knobs not in {None, device.knobs}:
+        raise TransportError(
+            f"a simulated device named {name!r} exists and has other knobs",
+            hint="give the knobs where it is opened first, and later its name alone",
+        )
+    return device
 
 
-_KINDS: Final[Mapping[str, Callable[[Mapping[str, str]], SimulatedDevice]]] = {"compax": _compax}
+def _compax(query: Mapping[str, str], name: str | None) -> SimulatedDrive:
+    knobs = Knobs.from_query(query)
+    return SimulatedDrive(knobs) if name is None else drive_named(name, knobs if query else None)
 
-_named: dict[asyncio.AbstractEventLoop, dict[str, SimulatedDrive]] = {}
+
+def _smc(query: Mapping[str, str], name: str | None) -> SimulatedPartyLine:
+    knobs = LineKnobs.from_query(query)
+    return SimulatedPartyLine(knobs) if name is None else line_named(name, knobs if query else None)
+
+
+_KINDS: Final[Mapping[str, Callable[[Mapping[str, str], str | None], SimulatedDevice]]] = {
+    "compax": _compax,
+    "smc": _smc,
+}
+
+_devices: dict[asyncio.AbstractEventLoop, dict[str, Any]] = {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Mapping
 from enum import Enum, auto
 from typing import Any, Final
@@ -16,7 +17,7 @@ from .log import MAX_ENTRIES, Log, LogKind
 from .machine import Machine, Message, MessageKind
 from .port import Received, ReceivedFrame, ReceivedLine, SerialPort
 from .refusals import RefusedError
-from .state import read_state, written_state
+from .state import read_state, read_state_file, written_state
 
 __all__ = ["SimulatedDrive"]
 
@@ -194,6 +195,17 @@ class SimulatedDrive:
         self._machine.put_back(kept, self._now)
         self._heed_p20()
         self._changed()
+
+    @staticmethod
+    def read_state_file(path: str | os.PathLike[str]) -> dict[str, Any]:
+        """
+        Read a file of a state.
+
+        Raises:
+            ValueError: It is no such file, or holds something that no drive can keep; says what and where.
+            OSError: It cannot be read.
+        """
+        return read_state_file(path)
 
     @property
     def fault(self) -> int | None:

@@ -2,32 +2,19 @@
 
 from __future__ import annotations
 
-import dataclasses
-import functools
-import math
 import re
-import typing
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Final, Literal, Self
 
 from compax_aio.compax.facts.commands import COMMANDS
 from compax_aio.compax.facts.limits import MAX_ACCELERATION_TIME_MS, MAX_POSITION, MAX_SPEED_PERCENT
-from compax_aio.errors import TransportError
+
+from ..knob_fields import Range, check_knobs, impossible, knobs_from_query
 
 __all__ = ["Knobs"]
 
-
-@dataclass(frozen=True, slots=True)
-class _Range:
-    low: float
-    high: float
-
-    def __str__(self) -> str:
-        return f"{self.low:g} to {self.high:g}"
-
-    def allows(self, value: float) -> bool:
-        return math.isfinite(value) and self.low <= value <= self.high
+_DEVICE: Final = "COMPAX"
 
 
 class _NewWord:
@@ -43,9 +30,9 @@ class _NewWord:
         return self._FORM.fullmatch(value) is not None and value.replace(" ", "") not in self._TAKEN
 
 
-_Position = Annotated[float, _Range(-MAX_POSITION, MAX_POSITION)]
-_Seconds = Annotated[float, _Range(0, 3600)]
-_RampTime = Annotated[int, _Range(0, MAX_ACCELERATION_TIME_MS)]
+_Position = Annotated[float, Range(-MAX_POSITION, MAX_POSITION)]
+_Seconds = Annotated[float, Range(0, 3600)]
+_RampTime = Annotated[int, Range(0, MAX_ACCELERATION_TIME_MS)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,7 +86,7 @@ class Knobs:
     """A command is received only after the last answer is out (UG p. 160): bytes before that are lost, not kept."""
     xonxoff: bool = False
     """P20 bit 0: Xoff from the host holds the output. Without it Xon and Xoff are characters like others."""
-    p20: Annotated[int, _Range(0, 255)] = 0
+    p20: Annotated[int, Range(0, 255)] = 0
     """P20 at the beginning, beside what ``xonxoff`` and ``error_style`` set; 16: binary commands (UG p. 166)."""
 
     # Parameters
@@ -122,7 +109,7 @@ class Knobs:
     """Byte timing of both directions, ten bits a byte; 0: bytes take no time."""
     answer_time_s: _Seconds = 0.002
     """From the CR of a line to its execution and the first byte of its answer (not documented)."""
-    record_time_s: Annotated[float, _Range(0.0001, 3600)] = 0.002
+    record_time_s: Annotated[float, Range(0.0001, 3600)] = 0.002
     """What a record of the program takes (not documented)."""
     self_test_s: _Seconds = 0.0
     """After power-on, S16 bit 1 stays 0 and positioning is refused for so long (UG p. 209; the time is unknown)."""
@@ -131,9 +118,9 @@ class Knobs:
 
     unit: Literal["mm", "inch", "degree", "increments"] = "mm"
     """P90: what positions are counted in."""
-    nominal_speed: Annotated[float, _Range(0.001, 1e9)] = 200.0
+    nominal_speed: Annotated[float, Range(0.001, 1e9)] = 200.0
     """Units per second at SPEED 100."""
-    speed_percent: Annotated[float, _Range(0.001, MAX_SPEED_PERCENT)] = 100.0
+    speed_percent: Annotated[float, Range(0.001, MAX_SPEED_PERCENT)] = 100.0
     """P2: the speed from power-on until SPEED says another."""
     acceleration_ms: _RampTime = 250
     """P6: the time from standstill to nominal speed, from power-on until ACCEL says another."""
@@ -149,16 +136,13 @@ class Knobs:
     """P12: targets below it are refused."""
     travel_max: _Position = MAX_POSITION
     """P11: targets above it are refused."""
-    following_error_factor: Annotated[float, _Range(0, 1)] = 0.001
+    following_error_factor: Annotated[float, Range(0, 1)] = 0.001
     """Following error in units for each unit per second: the time in s by which the axis lags behind."""
 
     def __post_init__(self) -> None:
-        for key, (_, allows, allowed) in _fields().items():
-            value = getattr(self, key)
-            if not allows(value):
-                raise _impossible(key, value, allowed)
+        check_knobs(self, _DEVICE)
         if self.travel_min >= self.travel_max:
-            raise _impossible("travel_min", self.travel_min, f"less than travel_max, {self.travel_max:g}")
+            raise impossible(_DEVICE, "travel_min", self.travel_min, f"less than travel_max, {self.travel_max:g}")
 
     @classmethod
     def from_query(cls, query: Mapping[str, str]) -> Self:
@@ -168,37 +152,4 @@ class Knobs:
         Raises:
             TransportError: No knob has that name, or it cannot be set to that value; names those that are possible.
         """
-        values: dict[str, Any] = {"decimals": 3} if query.get("unit") == "inch" else {}
-        for key, text in query.items():
-            if key not in _fields():
-                raise TransportError(
-                    f"a simulated COMPAX has no knob {key!r} (={text!r})", hint=f"its knobs are {', '.join(_fields())}"
-                )
-            read, _, allowed = _fields()[key]
-            try:
-                values[key] = read(text)
-            except (KeyError, ValueError):
-                raise _impossible(key, text, allowed) from None
-        return cls(**values)
-
-
-def _impossible(key: str, value: object, allowed: str) -> TransportError:
-    return TransportError(f"a simulated COMPAX cannot have {key}={value!r}", hint=f"allowed: {allowed}")
-
-
-_Field = tuple[Callable[[str], Any], Callable[[Any], bool], str]
-
-
-@functools.cache
-def _fields() -> Mapping[str, _Field]:
-    """Say of each knob how its text is read, which values it takes, and how to tell the user."""
-    hints = typing.get_type_hints(Knobs, include_extras=True)
-    return {field.name: _field(hints[field.name]) for field in dataclasses.fields(Knobs)}
-
-
-def _field(hint: Any) -> _Field:
-    if typing.get_origin(hint) is Annotated:
-        kind, limits = typing.get_args(hint)
-        return kind, limits.allows, str(limits)
-    values = {"0": False, "1": True} if hint is bool else {str(value): value for value in typing.get_args(hint)}
-    return values.__getitem__, list(values.values()).__contains__, ", ".join(values)
+        return knobs_from_query(cls, _DEVICE, query, {"decimals": 3} if query.get("unit") == "inch" else {})

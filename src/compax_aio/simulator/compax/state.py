@@ -1,18 +1,16 @@
-"""What a simulated drive keeps without power: as plain data, and as a file that is written whole and read strictly."""
+"""What a simulated drive keeps without power, as plain data that is read strictly."""
 
 from __future__ import annotations
 
-import json
 import os
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Final, NoReturn, TypeVar
 
 from compax_aio.escaping import shown
-from compax_aio.text_file import name_of, read_text, replace_file
 
+from ..state_file import load_state_file, write_state_file
 from .faults import STAGES
 from .parameters import stored
 from .program import check_record
@@ -99,51 +97,19 @@ def read_state(state: Mapping[str, Any]) -> Kept:
     )
 
 
-def write_state_file(path: str | os.PathLike[str], state: Mapping[str, Any]) -> None:
-    """
-    Write *state* to *path* as JSON; a file that is there is replaced at the end, or left as it is.
-
-    Raises:
-        OSError: The file cannot be written.
-    """
-    replace_file(Path(path), json.dumps(state, indent=2, allow_nan=False) + "\n")
-
-
 def read_state_file(path: str | os.PathLike[str]) -> dict[str, Any]:
     """
-    Read a file that :func:`write_state_file` has written, and look whether a drive could keep that.
+    Read a file that :func:`.write_state_file` has written, and look whether a drive could keep that.
 
     Raises:
         ValueError: It is no such file, or holds something that no drive can keep; says what and where.
         OSError: It cannot be read.
     """
-    path = Path(path)
-    try:
-        text = read_text(path, "state")
-        state = json.loads(text, object_pairs_hook=_object, parse_constant=_no_number)
-        read_state(state)
-    except (ValueError, RecursionError) as error:
-        raise ValueError(f"{name_of(path)} is no state of a simulated drive: {error}") from error
-    assert isinstance(state, dict)
-    return state
+    return load_state_file(path, read_state, "drive")
 
 
 def _refuse(why: str) -> NoReturn:
     raise ValueError(why)
-
-
-def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Make a table of *pairs*; of two values for one name nobody knows which is meant."""
-    table: dict[str, Any] = {}
-    for name, value in pairs:
-        if name in table:
-            _refuse(f"{shown(name)} stands there twice")
-        table[name] = value
-    return table
-
-
-def _no_number(text: str) -> NoReturn:
-    _refuse(f"{text} is no number")
 
 
 def _expect_keys(table: Mapping[str, Any], where: str, names: frozenset[str]) -> None:

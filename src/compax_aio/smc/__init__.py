@@ -1,0 +1,1 @@
+"""AMS SMC stepper axes."""
