@@ -39,8 +39,8 @@ fuzz:  ## every parser with bytes that nobody thought of, FUZZ_S seconds each (6
 	@$(MAKE) --no-print-directory VENV=.venv-fuzz .venv-fuzz/fuzz.ready
 	@.venv-fuzz/bin/python -m fuzz all -max_total_time=$(or $(FUZZ_S),60)
 
-hunt: $(VENV)/test.ready  ## whole applications in trouble, seed after seed, for HUNT_MINUTES (30)
-	@$(BIN)/python -m compax_aio.simulator.hunt --minutes $(or $(HUNT_MINUTES),30)
+hunt: $(VENV)/test.ready  ## whole applications in trouble, seed after seed, for HUNT_MINUTES (30); HUNT_DEVICE=smc
+	@$(BIN)/python -m compax_aio.simulator.hunt --device $(or $(HUNT_DEVICE),compax) --minutes $(or $(HUNT_MINUTES),30)
 
 clean:  ## forget the virtual environments and everything built
 	rm -rf .venv .venv-* build dist docs/_build .coverage .coverage.* .pytest_cache .mypy_cache .ruff_cache .hypothesis .fuzz

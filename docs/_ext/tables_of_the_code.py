@@ -9,6 +9,7 @@ import re
 import textwrap
 import typing
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 from typing import Any, ClassVar
 
 from docutils import nodes
@@ -27,6 +28,12 @@ from compax_aio.compax.facts.status import S16_BITS, S17_BITS, STATUS_VALUES
 from compax_aio.compax.protocol import TRANSITIONS, State
 from compax_aio.compax.settings import Dialect, DriveSettings
 from compax_aio.simulator.compax import Knobs
+from compax_aio.simulator.smc import Knobs as SmcKnobs
+from compax_aio.smc.facts import COMMANDS, Reply
+from compax_aio.smc.profile import PROFILES, Profile
+from compax_aio.smc.protocol_states import TRANSITIONS as SMC_TRANSITIONS
+from compax_aio.smc.protocol_states import State as SmcState
+from compax_aio.smc.settings import SmcSettings
 
 __all__ = ["setup"]
 
@@ -187,6 +194,73 @@ def _transitions() -> Table:
     return ("event \\ in state", *(_code(state.name) for state in State)), rows
 
 
+# SMC
+
+
+def _smc_commands() -> Table:
+    def flags(row: Any) -> str:
+        told = ["action"] if row.is_action else []
+        return ", ".join([*told, *(["moves"] if row.moves else [])])
+
+    rows = [
+        (
+            _code(row.letter),
+            row.meaning,
+            "" if row.reply is Reply.NOTHING else row.reply.value,
+            flags(row),
+            ", ".join(profile.name for profile in PROFILES.values() if row.letter in profile.commands),
+            row.source,
+        )
+        for row in COMMANDS.values()
+    ]
+    return ("command", "meaning", "answer", "is", "known of", "source"), rows
+
+
+def _profiles() -> Table:
+    rows = [
+        (_code(field.name), *(_fact(getattr(profile, field.name)) for profile in PROFILES.values()))
+        for field in dataclasses.fields(Profile)
+    ]
+    return ("", *PROFILES), rows
+
+
+def _fact(value: object) -> str:
+    """Write what a profile says, for people."""
+    if value is None or value == ():
+        return "not known"
+    if isinstance(value, frozenset):
+        return " ".join(sorted(value))
+    if isinstance(value, tuple):
+        return ", ".join(map(_fact, value))
+    return "blank" if value == " " else f"{value:,.10g}" if isinstance(value, float) else str(value)
+
+
+def _smc_states() -> Table:
+    meanings = dict(_field_docstrings(SmcState))
+    return ("state", "meaning"), [(_code(state.name), meanings[state.name]) for state in SmcState]
+
+
+def _smc_transitions() -> Table:
+    rows: list[Sequence[Cell]] = []
+    for step in dict.fromkeys(step for _, step in SMC_TRANSITIONS):
+        after = {state: SMC_TRANSITIONS[state, step] for state in SmcState if (state, step) in SMC_TRANSITIONS}
+        if len(after) == len(SmcState):
+            rows.append((step.value, "any", _code(after[SmcState.READY].name)))
+        else:
+            rows += [(step.value, _code(state.name), _code(then.name)) for state, then in after.items()]
+    return ("event", "in state", "leads to"), rows
+
+
+def _smc_settings() -> Table:
+    meanings = dict(_field_docstrings(SmcSettings))
+    rows = [(_code(name), _smc_shown(default), meanings[name]) for name, default in _defaults(SmcSettings)]
+    return ("setting", "default", "meaning"), rows
+
+
+def _smc_shown(value: Any) -> str:
+    return value.name if isinstance(value, Profile) else _shown(value)
+
+
 # Settings and knobs
 
 
@@ -224,21 +298,25 @@ def _attributes(docstring: str) -> Iterator[tuple[str, str]]:
         yield name, _plain(meaning.replace("…", ""))
 
 
-def _knobs() -> Table:
-    meanings = dict(_field_docstrings(Knobs))
-    kinds = typing.get_type_hints(Knobs, include_extras=True)
-    rows = [(_code(name), _values(kinds[name]), _shown(default), meanings[name]) for name, default in _defaults(Knobs)]
+def _knobs(kind: type) -> Table:
+    meanings = dict(_field_docstrings(kind))
+    kinds = typing.get_type_hints(kind, include_extras=True)
+    rows = [
+        (_code(name), _values(kinds[name]), _shown(default), meanings.get(name, ""))
+        for name, default in _defaults(kind)
+    ]
     return ("knob", "values", "default", "meaning"), rows
 
 
 def _field_docstrings(kind: type) -> Iterator[tuple[str, str]]:
-    """Read the string that stands under each field of a dataclass."""
+    """Read the string that stands under each field of a dataclass, or member of an enumeration."""
     (definition,) = ast.parse(textwrap.dedent(inspect.getsource(kind))).body
     assert isinstance(definition, ast.ClassDef)
     name = ""
     for statement in definition.body:
-        if isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name):
-            name = statement.target.id
+        if isinstance(statement, ast.AnnAssign | ast.Assign):
+            (target,) = statement.targets if isinstance(statement, ast.Assign) else (statement.target,)
+            name = target.id if isinstance(target, ast.Name) else ""
         elif name and isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant):
             meaning = _ROW.sub("", _plain(str(statement.value.value)))
             yield name, meaning[:1].upper() + meaning[1:] if re.match("a |[a-z]{2}", meaning) else meaning
@@ -303,7 +381,13 @@ def setup(app: Sphinx) -> dict[str, bool]:
         ("table-of-states", _states),
         ("table-of-transitions", _transitions),
         ("table-of-settings", _settings),
-        ("table-of-knobs", _knobs),
+        ("table-of-knobs", partial(_knobs, Knobs)),
+        ("table-of-smc-commands", _smc_commands),
+        ("table-of-smc-states", _smc_states),
+        ("table-of-smc-transitions", _smc_transitions),
+        ("table-of-smc-settings", _smc_settings),
+        ("table-of-smc-knobs", partial(_knobs, SmcKnobs)),
+        ("table-of-profiles", _profiles),
     )
     for name, make in tables:
         app.add_directive(name, _directive(make))

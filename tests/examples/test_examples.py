@@ -17,7 +17,10 @@ import pytest
 from compax_aio.errors import ConnectionLostError
 from compax_aio.simulator.clock import VirtualClockLoop
 from compax_aio.simulator.compax import Knobs, LogKind, SimulatedDrive
-from compax_aio.simulator.server import drive_named, serve_tcp
+from compax_aio.simulator.server import drive_named, line_named, serve_tcp
+from compax_aio.simulator.smc import Ending, SimulatedPartyLine
+from compax_aio.simulator.smc import Knobs as SmcKnobs
+from compax_aio.simulator.smc import LogKind as SmcLogKind
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 NAMES = sorted(path.stem for path in EXAMPLES.glob("*.py"))
@@ -33,26 +36,39 @@ def load(name: str) -> ModuleType:
 
 
 @pytest.fixture
-def virtual_clock(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], SimulatedDrive]:
-    """Let main() run on a virtual clock; gives a function that makes a drive in advance, to look at its log after."""
-    loops: list[VirtualClockLoop] = []
-
-    def make_loop() -> VirtualClockLoop:
-        return loops[0]
+def loop_of_main(monkeypatch: pytest.MonkeyPatch) -> VirtualClockLoop:
+    """Let main() run on a virtual clock."""
+    loop = VirtualClockLoop()
 
     def run(work: Coroutine[Any, Any, None]) -> None:
-        with asyncio.Runner(loop_factory=make_loop) as runner:
+        with asyncio.Runner(loop_factory=lambda: loop) as runner:
             runner.run(work)
+
+    monkeypatch.setattr(asyncio, "run", run)
+    return loop
+
+
+@pytest.fixture
+def virtual_clock(loop_of_main: VirtualClockLoop) -> Callable[[str], SimulatedDrive]:
+    """Give a function that makes a drive for main() in advance, to look at its log after."""
 
     def drive(name: str) -> SimulatedDrive:
         async def make() -> SimulatedDrive:
             return drive_named(name, Knobs(machine_zero=-40.0))
 
-        return loops[0].run_until_complete(make())
+        return loop_of_main.run_until_complete(make())
 
-    loops.append(VirtualClockLoop())
-    monkeypatch.setattr(asyncio, "run", run)
     return drive
+
+
+@pytest.fixture
+def party_line(loop_of_main: VirtualClockLoop) -> SimulatedPartyLine:
+    """Make a line for main() in advance, ``sim://smc?name=table``."""
+
+    async def make() -> SimulatedPartyLine:
+        return line_named("table", SmcKnobs(axes="XYZ", home=-300, baudrate=9600))
+
+    return loop_of_main.run_until_complete(make())
 
 
 def lines_of(captured: pytest.CaptureFixture[str]) -> list[str]:
@@ -163,6 +179,66 @@ def test_a_fault_of_one_axis_stops_the_others(
     assert "E55, emergency stop" in told
     assert "x: move_to(100) was stopped" in told
     assert drives["x"].log.texts(LogKind.MOTION_STOPPED)
+
+
+# Axes on one line
+
+
+def test_three_axes_on_one_line_are_homed_in_turn_and_moved_together(
+    party_line: SimulatedPartyLine, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert load("three_axes_on_one_line").main(["sim://smc?name=table"]) == 0
+    told = lines_of(capsys)
+    assert told[:3] == ["X is at home", "Y is at home", "Z is at home"]
+    assert [line.split(" after")[0] for line in told if "reached" in line] == [
+        f"table axis {axis} has reached {target}"
+        for axis, target in (("Z", 1500), ("Y", 4000), ("X", 9000), ("Z", 0), ("Y", 0), ("X", 0))
+    ]
+    assert sum("X  " in line for line in told) > 6, "they were not watched on their way"
+    assert party_line.log.texts(SmcLogKind.MOTION_STARTED, axis="X") == ["F1000 1", "R9000", "R0"]
+    begun = [entry.at for entry in party_line.log if entry.text in {"R9000", "R4000", "R1500"}]
+    assert max(begun) - min(begun) < 0.3, "moved one after the other"
+
+
+def test_ctrl_c_stops_all_axes_of_a_line(party_line: SimulatedPartyLine, capsys: pytest.CaptureFixture[str]) -> None:
+    example = load("three_axes_on_one_line")
+    tour = example.tour
+
+    async def interrupted(*arguments: Any) -> None:
+        asyncio.get_running_loop().call_later(6.0, signal.raise_signal, signal.SIGINT)
+        await tour(*arguments)
+
+    vars(example)["tour"] = interrupted
+    assert example.main(["sim://smc?name=table"]) == 130
+    assert "interrupted; the axes were stopped" in capsys.readouterr().err
+    assert Ending.STOP in party_line.log.texts(SmcLogKind.MOTION_ENDED, axis="X")
+    assert not any(axis.moving for axis in party_line.axes.values())
+
+
+def test_an_axis_that_fails_leaves_the_others_of_its_line_standing(
+    party_line: SimulatedPartyLine, capsys: pytest.CaptureFixture[str]
+) -> None:
+    example = load("three_axes_on_one_line")
+    tour = example.tour
+
+    async def disturbed(*arguments: Any) -> None:
+        asyncio.get_running_loop().call_later(6.0, party_line.axes["X"].reset)
+        await tour(*arguments)
+
+    vars(example)["tour"] = disturbed
+    assert example.main(["sim://smc?name=table"]) == 1
+    assert "MoveStoppedError: table axis X: move to 9000 steps ended at 0.00 steps" in capsys.readouterr().err
+    assert not any(axis.moving for axis in party_line.axes.values())
+
+
+@pytest.mark.parametrize("axes", ["XY", "XYZA"])
+def test_no_more_and_no_fewer_than_three_axes_are_moved(
+    party_line: SimulatedPartyLine, capsys: pytest.CaptureFixture[str], axes: str
+) -> None:
+    with pytest.raises(SystemExit):
+        load("three_axes_on_one_line").main(["sim://smc?name=table", "--axes", axes])
+    assert "--axes are three letters" in capsys.readouterr().err
+    assert not party_line.log.texts(SmcLogKind.RECEIVED)
 
 
 # Pick and place

@@ -374,7 +374,7 @@ def test_a_stream_of_positions_is_not_started(text: str) -> None:
     said = refusal(lambda: check_raw(text))
     assert said is not None
     assert "come without end" in said
-    assert "watch()" in said
+    assert "positions()" in said
 
 
 def test_what_is_no_text_is_no_command() -> None:

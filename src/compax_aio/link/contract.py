@@ -23,7 +23,12 @@ __all__ = [
 
 
 class Lane(IntEnum):
-    """What goes first when the line is free; inside a lane everybody who shares the line in turn, first come first."""
+    """
+    What goes first when the line is free, and first come, first served in each.
+
+    Those who share a line have their turns one after the other, whatever they want; only a stop and the look at who is
+    there go before the turns of others.
+    """
 
     STOP = 0
     GREETING = 1

@@ -1,10 +1,10 @@
-"""What waits for its turn on a line: exchanges in lanes, who shares the line in turn, reads shared and held back."""
+"""What waits for its turn on a line: who shares it in turn, exchanges in lanes, reads shared and held back."""
 
 from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Callable, Container, Iterator
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -14,6 +14,10 @@ from .contract import Lane, TurnOver
 __all__ = ["Exchange", "ExchangeQueue"]
 
 _CROWD: Final = 16
+
+_AHEAD_OF_ALL: Final = (Lane.STOP, Lane.GREETING)
+_IN_TURN: Final = (Lane.CONTROL, Lane.MOTION, Lane.READ)
+_ALL_BUT_READS: Final = (Lane.CONTROL, Lane.MOTION)
 
 
 @dataclass(slots=True, eq=False)
@@ -74,34 +78,12 @@ class Exchange:
                 waiter.set_exception(make_error(self))
 
 
-class _Waiting:
-    """One lane: those who share the line take turns, and each one's exchanges go in the order in which they came."""
-
-    def __init__(self) -> None:
-        self._of: dict[str, deque[Exchange]] = {}
-
-    def __iter__(self) -> Iterator[Exchange]:
-        return (exchange for waiting in self._of.values() for exchange in waiting)
-
-    def append(self, exchange: Exchange) -> None:
-        self._of.setdefault(exchange.party, deque()).append(exchange)
-
-    def popleft(self, held: Container[str]) -> Exchange | None:
-        party = next((party for party in self._of if party not in held), None)
-        if party is None:
-            return None
-        waiting = self._of.pop(party)
-        exchange = waiting.popleft()
-        if waiting:
-            self._of[party] = waiting  # behind the others
-        return exchange
-
-    def clear(self) -> None:
-        self._of.clear()
-
-
 class ExchangeQueue:
-    """Lanes, the most urgent first; inside a lane everybody on the line in turn, and first come, first served."""
+    """
+    Everybody who shares the line in turn, and of each the most urgent exchange, first come, first served.
+
+    Stops go before everything, and so does the look at who is there, whosoever they are.
+    """
 
     def __init__(self) -> None:
         self.reads_are_held = False
@@ -110,7 +92,8 @@ class ExchangeQueue:
         """Of those who share the line, whose exchanges stay where they are."""
         self.is_admitted = True
         """Unless set, nothing goes that is less urgent than the look at who is there."""
-        self._lanes: tuple[_Waiting, ...] = tuple(_Waiting() for _ in Lane)
+        self._parties: dict[str, tuple[deque[Exchange], ...]] = {}
+        """By party, whose turn it is first: a queue for each lane."""
         self._reads: dict[str, Exchange] = {}
 
     def put(self, exchange: Exchange) -> None:
@@ -120,30 +103,46 @@ class ExchangeQueue:
                 shared.add_waiters(exchange.waiters)
                 return
             self._reads[exchange.text] = exchange
-        self._lanes[exchange.lane].append(exchange)
+        if exchange.party not in self._parties:
+            self._parties[exchange.party] = tuple(deque() for _ in Lane)
+        self._parties[exchange.party][exchange.lane].append(exchange)
 
     def take_next(self) -> Exchange | None:
         """Take out what is to be sent next; what nobody waits for any more is dropped."""
-        for lane in Lane:
-            if (lane is Lane.READ and self.reads_are_held) or (lane > Lane.GREETING and not self.is_admitted):
-                return None
-            waiting = self._lanes[lane]
-            while (exchange := waiting.popleft(self.held)) is not None:
-                if lane is Lane.READ:
-                    del self._reads[exchange.text]
-                if exchange.is_wanted:
-                    return exchange
+        for lane in _AHEAD_OF_ALL:
+            if (exchange := self._take((lane,))) is not None:
+                return exchange
+        if not self.is_admitted:
+            return None
+        return self._take(_ALL_BUT_READS if self.reads_are_held else _IN_TURN)
+
+    def _take(self, lanes: Sequence[Lane]) -> Exchange | None:
+        for party, waiting in self._parties.items():
+            if party in self.held:
+                continue
+            for lane in lanes:
+                while waiting[lane]:
+                    exchange = waiting[lane].popleft()
+                    if lane is Lane.READ:
+                        del self._reads[exchange.text]
+                    if exchange.is_wanted:
+                        self._end_turn(party)
+                        return exchange
         return None
+
+    def _end_turn(self, party: str) -> None:
+        waiting = self._parties.pop(party)
+        if any(waiting):
+            self._parties[party] = waiting  # behind the others
 
     def first_stop(self) -> Exchange | None:
         """Find the stop that goes first, and leave it where it is."""
-        stops = self._lanes[Lane.STOP]
-        return next((exchange for exchange in stops if exchange.is_wanted and exchange.party not in self.held), None)
+        stops = (each for party, lanes in self._parties.items() if party not in self.held for each in lanes[Lane.STOP])
+        return next((stop for stop in stops if stop.is_wanted), None)
 
     def take_all(self) -> list[Exchange]:
         """Take out everything, the most urgent first."""
-        waiting = [exchange for lane in self._lanes for exchange in lane]
-        for lane in self._lanes:
-            lane.clear()
+        waiting = [exchange for lane in Lane for lanes in self._parties.values() for exchange in lanes[lane]]
+        self._parties.clear()
         self._reads.clear()
         return waiting

@@ -21,16 +21,25 @@ class Failures:
         history: Its last bytes, told in every error.
         answer_timeout_s: How long an answer may take.
         resync_attempts: How many markers are tried.
+        marker_timeout_s: How long each of them takes.
         advice_on_silence: What to look at when nothing comes at all.
     """
 
     def __init__(
-        self, name: str, history: WireHistory, answer_timeout_s: float, resync_attempts: int, advice_on_silence: str
+        self,
+        name: str,
+        history: WireHistory,
+        *,
+        answer_timeout_s: float,
+        resync_attempts: int,
+        marker_timeout_s: float,
+        advice_on_silence: str,
     ) -> None:
         self._name = name
         self._history = history
         self._answer_timeout_s = answer_timeout_s
         self._resync_attempts = resync_attempts
+        self._marker_timeout_s = marker_timeout_s
         self._advice_on_silence = advice_on_silence
 
     def timeout(self, exchange: Exchange) -> AnswerTimeoutError:
@@ -48,7 +57,7 @@ class Failures:
         """Say that nobody answers as this device would."""
         received = self._history.received_since_sent()
         return AnswerTimeoutError(
-            f"no sensible answer to {self._resync_attempts} queries in a row, {self._answer_timeout_s:g} s each",
+            f"no sensible answer to {self._resync_attempts} queries in a row, {self._marker_timeout_s:g} s each",
             device=self._name,
             sent=exchange.text if exchange else self._history.last_sent(),
             received=received,

@@ -73,6 +73,7 @@ class Link(asyncio.Protocol):
         greet: Awaited on every line that was opened and is in step, before anything goes over it that is less urgent
             than ``Lane.GREETING``: looks who is there, and raises CompaxError if it is not who it should be.
         reconnecting: How a line that was lost is opened again; None: it is not.
+        marker_timeout_s: How long a marker takes that is not answered; None: as long as an answer may.
         advice_on_silence: What a person should look at when nobody answers at all.
     """
 
@@ -87,13 +88,21 @@ class Link(asyncio.Protocol):
         on_lost: Callable[[ConnectionLostError], None],
         greet: Callable[[], Awaitable[None]] | None = None,
         reconnecting: Reconnecting | None = None,
+        marker_timeout_s: float | None = None,
         advice_on_silence: str = "check power, cable, port, baud rate and handshake",
     ) -> None:
         self.stats = LinkStats()
         self.history = WireHistory()
         self._protocol = protocol
         self._log = Seldom(logging.getLogger("compax_aio.link"), name)
-        self._failures = Failures(name, self.history, answer_timeout_s, resync_attempts, advice_on_silence)
+        self._failures = Failures(
+            name,
+            self.history,
+            answer_timeout_s=answer_timeout_s,
+            resync_attempts=resync_attempts,
+            marker_timeout_s=answer_timeout_s if marker_timeout_s is None else marker_timeout_s,
+            advice_on_silence=advice_on_silence,
+        )
         self._on_lost = on_lost
         self._greet = greet
         self._reconnecting = reconnecting
@@ -262,7 +271,7 @@ class Link(asyncio.Protocol):
         Args:
             text: The line without its end sign; checked by the caller.
             lane: What goes first. Identical lines that wait in ``Lane.READ`` share one exchange.
-            party: Whose it is, where several share the line: in one lane they take turns.
+            party: Whose it is, where several share the line: they take turns.
             settles_late: After a time-out, wait until the line is in step again, for the answer may come late; where
                 nothing may be sent to get in step, only as long as an answer may take, once more.
             survives_loss: Wait for a line that is lost, and send it again when it is back; for what does no harm when

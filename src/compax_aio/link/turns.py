@@ -141,6 +141,7 @@ class Turns:
         """Give up what is outstanding: nobody will answer it on this line."""
         self._deadline.cancel()
         self._protocol.line_lost()
+        self._take_events()
         self.release_reads()
 
     def admit(self) -> None:

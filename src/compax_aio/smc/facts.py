@@ -27,7 +27,9 @@ __all__ = [
     "MAX_POSITION",
     "NOT_A_NAME",
     "NO_NAME",
+    "ORIGIN",
     "POSSIBLE_NAMES",
+    "PROGRAM_ENTRY",
     "PROMPT",
     "RESET",
     "SPACE",
@@ -155,6 +157,8 @@ COMMANDS: Final[Mapping[str, Command]] = MappingProxyType(
     }
 )
 
+ORIGIN: Final = "O"
+PROGRAM_ENTRY: Final = "P"
 _UNKNOWN: Final = "not known"
 _PORT: Final = "A129"
 

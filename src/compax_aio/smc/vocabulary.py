@@ -323,7 +323,7 @@ def check_raw(text: str) -> str:
     if _STREAM.fullmatch(text):
         raise InvalidCommandError(
             f"{text!r} may start positions that come without end (gem-controld); no answer could be told from them",
-            hint="watch() asks for one position after the other",
+            hint="position() asks for one at a time, and a move has positions()",
         )
     return text
 

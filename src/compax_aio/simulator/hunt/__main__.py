@@ -10,23 +10,21 @@ import time
 from collections.abc import Iterable, Sequence
 from typing import Final
 
+from ..smc_hunt.quarry import SMC
 from .day import run_day
-from .drawing import draw_scenario
 from .hunting import Hunt
-from .promises import broken
+from .quarry import COMPAX, Quarry
 from .shrink import shrink
-from .simulation import simulate
-from .story import story
 
 __all__ = ["main"]
 
 _DESCRIPTION: Final = """\
 Looks for seeds that break a promise of compax_aio.
 
-Each seed is a whole application: one to four simulated drives, users who move, stop, read, cancel and leave, and
-troubles that befall the drives, their lines and the event loop; all in virtual time, so that many run in a second. What
-the far end has seen is held against what every caller was told, promise by promise (P1 to P10). Nothing depends on
-anything but the seed: what was found once is found again.
+Each seed is a whole application: one to four simulated drives, or a line with one to five SMC axes (--device smc);
+users who move, stop, read, cancel and leave, and troubles that befall the drives, their lines and the event loop; all
+in virtual time, so that many run in a second. What the far end has seen is held against what every caller was told,
+promise by promise (P1 to P10). Nothing depends on anything but the seed: what was found once is found again.
 """
 _EXAMPLES: Final = """\
 examples:
@@ -35,10 +33,12 @@ examples:
   python -m compax_aio.simulator.hunt --minutes 30 --jobs 4    for half an hour, from a place that changes
   python -m compax_aio.simulator.hunt --seed 17                one seed with its story, shrunk if it breaks a promise
   python -m compax_aio.simulator.hunt --seed 17 --keep 0,3,5   some parts of it, by the numbers that the story gives
+  python -m compax_aio.simulator.hunt --device smc --seed 17   the same of a line with SMC axes
   python -m compax_aio.simulator.hunt --day                    24 hours of eight drives with troubles
 
 exit code: 0 nothing found, 1 something found, 130 ended by Ctrl-C
 """
+_QUARRIES: Final = {each.device: each for each in (COMPAX, SMC)}
 _USUAL_SEEDS: Final = "0:10000"
 _TOLD: Final = 5
 """Finds that are shrunk and told; the others are listed."""
@@ -47,12 +47,13 @@ _TOLD: Final = 5
 def main(arguments: Sequence[str] | None = None) -> int:
     """Hunt as the command line says; returns the exit code."""
     wanted = _parser().parse_args(arguments)
+    quarry = _QUARRIES[wanted.device]
     try:
         if wanted.day:
             return run_day(wanted.hours, _print)
         if wanted.seed is not None:
-            return _replay(wanted.seed, wanted.keep, shrinks=not wanted.as_is)
-        return _hunt(wanted)
+            return _replay(quarry, wanted.seed, wanted.keep, shrinks=not wanted.as_is)
+        return _hunt(quarry, wanted)
     except KeyboardInterrupt:
         return 130
 
@@ -63,6 +64,9 @@ def _parser() -> argparse.ArgumentParser:
         description=_DESCRIPTION,
         epilog=_EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "--device", choices=tuple(_QUARRIES), default=COMPAX.device, help=f"what is hunted ({COMPAX.device})"
     )
     parser.add_argument("--seeds", type=_range, metavar="FROM:TO", help=f"which seeds (usual: {_USUAL_SEEDS})")
     parser.add_argument("--minutes", type=float, metavar="M", help="leave off after so long")
@@ -86,23 +90,24 @@ def _numbers(text: str) -> tuple[int, ...]:
     return tuple(int(number) for number in text.split(","))
 
 
-def _replay(seed: int, keep: Sequence[int] | None, *, shrinks: bool) -> int:
-    whole = scenario = draw_scenario(seed)
+def _replay(quarry: Quarry, seed: int, keep: Sequence[int] | None, *, shrinks: bool) -> int:
+    whole = scenario = quarry.draw(seed)
     if keep is not None:
         scenario = scenario.keep(keep)
-    testimony = simulate(scenario)
-    found = broken(testimony)
+    testimony = quarry.simulate(scenario)
+    found = quarry.broken(testimony)
     if found and shrinks and keep is None:
-        scenario = shrink(scenario, found[0].promise)
-        testimony = simulate(scenario)
-        found = broken(testimony)
-    _print(story(testimony, found, all_of_it=not shrinks))
+        scenario = shrink(scenario, found[0].promise, quarry)
+        testimony = quarry.simulate(scenario)
+        found = quarry.broken(testimony)
+    _print(quarry.story(testimony, found, all_of_it=not shrinks))
     kept = f" --keep {','.join(map(str, scenario.numbers))}" if scenario != whole else ""
-    _print(f"again: python -m compax_aio.simulator.hunt --seed {seed}{kept}")
+    device = "" if quarry is COMPAX else f" --device {quarry.device}"
+    _print(f"again: python -m compax_aio.simulator.hunt{device} --seed {seed}{kept}")
     return 1 if found else 0
 
 
-def _hunt(wanted: argparse.Namespace) -> int:
+def _hunt(quarry: Quarry, wanted: argparse.Namespace) -> int:
     seeds: Iterable[int]
     until = None
     if wanted.minutes is not None:
@@ -110,7 +115,7 @@ def _hunt(wanted: argparse.Namespace) -> int:
         seeds = wanted.seeds or itertools.count(int(time.time()))
     else:
         seeds = wanted.seeds or _range(_USUAL_SEEDS)
-    hunt = Hunt()
+    hunt = Hunt(quarry)
     progress = _Progress(first=wanted.first)
     code = 0
     try:
@@ -128,7 +133,7 @@ def _summary(hunt: Hunt, told: int) -> None:
     _print(f"{hunt.tried} seeds, {hunt.seeds_a_second:.0f} a second, {len(hunt.finds)} break a promise")
     for find in hunt.finds[:told]:
         _print("")
-        _replay(find.seed, None, shrinks=True)
+        _replay(hunt.quarry, find.seed, None, shrinks=True)
     for find in hunt.finds[told:]:
         _print(f"seed {find.seed}: {', '.join(find.promises)}")
 

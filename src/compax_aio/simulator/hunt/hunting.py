@@ -9,12 +9,11 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from multiprocessing.pool import Pool
 from typing import Final
 
-from .drawing import draw_scenario
-from .promises import broken
-from .simulation import simulate
+from .quarry import COMPAX, Quarry
 
 __all__ = ["Find", "Hunt", "try_seed"]
 
@@ -44,11 +43,13 @@ class Hunt:
     A hunt, as far as it has got.
 
     Attributes:
+        quarry: What is hunted.
         tried: How many seeds.
         finds: Those that break promises.
         is_over: Whether all seeds were tried.
     """
 
+    quarry: Quarry = COMPAX
     tried: int = 0
     finds: list[Find] = field(default_factory=list)
     is_over: bool = False
@@ -76,7 +77,7 @@ class Hunt:
             until: When to leave off, on the monotonic clock.
             on_progress: Called from time to time, and with every find.
         """
-        with _tries(seeds, jobs, try_seed) as tries:
+        with _tries(seeds, jobs, partial(try_seed, quarry=self.quarry)) as tries:
             for tried, find in tries:
                 self.tried += tried
                 if find is not None:
@@ -107,11 +108,11 @@ def _ignore_ctrl_c() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def try_seed(seed: int) -> Find | None:
+def try_seed(seed: int, quarry: Quarry = COMPAX) -> Find | None:
     """Run the scenario of *seed*; None if it breaks no promise."""
     try:
         with _not_for_ever():
-            found = broken(simulate(draw_scenario(seed)))
+            found = quarry.broken(quarry.simulate(quarry.draw(seed)))
     except Exception as error:
         error.add_note(f"in the simulation of seed {seed}")
         raise

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from random import Random
-from typing import Any
+from typing import Any, Generic, Self, TypeVar
 
 from compax_aio.compax.settings import DriveSettings
 from compax_aio.simulator.compax.knobs import Knobs
 
-__all__ = ["Action", "DrivePlan", "Item", "Scenario", "Trouble"]
+__all__ = ["Action", "DrivePlan", "Item", "Plan", "Scenario", "Scenery", "Trouble", "difference"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,17 +25,23 @@ class Item:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DrivePlan(Item):
-    """One drive, and how the client is set up for it."""
+class Plan(Item):
+    """What moves one axis."""
 
     axis: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DrivePlan(Plan):
+    """One drive, and how the client is set up for it."""
+
     knobs: Knobs
     settings: DriveSettings
     left_over: bytes = b""
     """Half a line that another host has left in the drive's entry buffer."""
 
     def __str__(self) -> str:
-        told = [_difference("knobs", self.knobs, Knobs()), _difference("settings", self.settings, DriveSettings())]
+        told = [difference("knobs", self.knobs, Knobs()), difference("settings", self.settings, DriveSettings())]
         if self.left_over:
             told.append(f"half a line before: {self.left_over!r}")
         return f"drive {self.axis} ({'; '.join(part for part in told if part) or 'as usual'})"
@@ -76,12 +82,15 @@ class Trouble(_Timed):
     lasts_s: float = 0.0
 
 
+_Plan = TypeVar("_Plan", bound=Plan)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Scenario:
-    """A whole simulation."""
+class Scenery(Generic[_Plan]):
+    """A whole simulation, of whatever devices."""
 
     seed: int
-    drives: tuple[DrivePlan, ...]
+    drives: tuple[_Plan, ...]
     actions: tuple[Action, ...]
     troubles: tuple[Trouble, ...]
 
@@ -95,7 +104,7 @@ class Scenario:
         """The numbers of all parts."""
         return tuple(item.number for item in self.items)
 
-    def keep(self, numbers: Collection[int]) -> Scenario:
+    def keep(self, numbers: Collection[int]) -> Self:
         """Leave out everything else; with a drive goes what is done to it alone."""
         drives = tuple(drive for drive in self.drives if drive.number in numbers)
         axes = {drive.axis for drive in drives}
@@ -110,12 +119,20 @@ class Scenario:
         return "\n".join(f"{item.number:4d}  {item}" for item in self.items)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scenario(Scenery[DrivePlan]):
+    """A whole simulation of drives, each with a line of its own."""
+
+    drives: tuple[DrivePlan, ...]
+
+
 def _on(item: Any, axes: Collection[str]) -> Any:
     """Return *item* as far as it concerns *axes*; None if nothing is left. What concerns none concerns all."""
     left = tuple(axis for axis in item.axes if axis in axes)
     return replace(item, axes=left) if left or not item.axes else None
 
 
-def _difference(what: str, value: Any, usual: Any) -> str:
+def difference(what: str, value: Any, usual: Any) -> str:
+    """Say in what *value* differs from *usual*; nothing if it does not."""
     names = [name for name in type(value).__slots__ if getattr(value, name) != getattr(usual, name)]
     return f"{what}: {', '.join(f'{name}={getattr(value, name)!r}' for name in names)}" if names else ""

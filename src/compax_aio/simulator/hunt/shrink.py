@@ -3,28 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
+from typing import Any, TypeVar
 
-from .promises import Broken, broken
-from .scenario import Scenario
-from .simulation import simulate
+from .quarry import COMPAX, Quarry
+from .scenario import Scenery
 
 __all__ = ["breaks", "ddmin", "shrink"]
 
+_Scenery = TypeVar("_Scenery", bound=Scenery[Any])
 
-def shrink(scenario: Scenario, promise: str) -> Scenario:
+
+def shrink(scenario: _Scenery, promise: str, quarry: Quarry = COMPAX) -> _Scenery:
     """Return the smallest part of *scenario* that was found to break *promise*."""
-    kept = ddmin(scenario.numbers, lambda numbers: breaks(scenario.keep(numbers), promise))
+    kept = ddmin(scenario.numbers, lambda numbers: breaks(scenario.keep(numbers), promise, quarry))
     return scenario.keep(kept)
 
 
-def breaks(scenario: Scenario, promise: str) -> bool:
+def breaks(scenario: Scenery[Any], promise: str, quarry: Quarry = COMPAX) -> bool:
     """Whether *scenario* breaks *promise*."""
-    return bool(scenario.drives) and any(found.promise == promise for found in broken_by(scenario))
-
-
-def broken_by(scenario: Scenario) -> list[Broken]:
-    """Run *scenario*, and list what it breaks."""
-    return broken(simulate(scenario))
+    if not scenario.drives:
+        return False
+    return any(found.promise == promise for found in quarry.broken(quarry.simulate(scenario)))
 
 
 def ddmin(parts: Sequence[int], still_fails: Callable[[Collection[int]], bool]) -> tuple[int, ...]:

@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import asyncio
-import gc
-import logging
-from collections.abc import Awaitable, Callable, Iterable, Iterator
-from contextlib import contextmanager
-from typing import Final, TypeVar
+from typing import Final
 
 import compax_aio
-from compax_aio.errors import CompaxError
-from compax_aio.simulator.clock import VirtualClockLoop
 from compax_aio.simulator.compax.drive import SimulatedDrive
 from compax_aio.simulator.compax.log import MAX_ENTRIES
 from compax_aio.simulator.line import DeviceLine
 
 from .actions import ACTIONS
+from .running import all_ended, in_time, let_go_of_tasks, run, told
 from .scenario import Action, DrivePlan, Scenario, Trouble
 from .stage import Stage
 from .testimony import Seen, SeenAxis, longest_opening_s
@@ -26,14 +21,8 @@ from .weighing import weigh
 
 __all__ = ["PROGRAM_TARGET", "simulate"]
 
-_Timed = TypeVar("_Timed", Action, Trouble)
-
-LONGEST_S: Final = 3600.0
-"""Of virtual time: what has not ended then never will."""
 PROGRAM_TARGET: Final = 333.0
 """Where the program in every drive goes, from where its axis has its positions."""
-_COLLECTED_AFTER: Final = 20_000
-"""Objects more than before."""
 _LOOKED_EVERY_S: Final = 0.1
 _AFTERWARDS_S: Final = 60.0
 """So long it is watched whether an axis that was left begins to move."""
@@ -48,43 +37,13 @@ def simulate(scenario: Scenario, *, log_entries: int = MAX_ENTRIES) -> Seen:
         log_entries: How much each simulated drive remembers of what it has done.
     """
     testimony = Seen(scenario)
-    loop = VirtualClockLoop()
-    try:
-        with _unlogged(), _rarely_collecting():
-            loop.run_until_complete(_run(testimony, log_entries))
-        loop.run_until_complete(loop.shutdown_default_executor())
-    finally:
-        # Without a runner, which waits for every task: one that cannot be cancelled is what we look for.
-        loop.close()
+    run(lambda: _run(testimony, log_entries))
     return testimony
-
-
-@contextmanager
-def _unlogged() -> Iterator[None]:
-    """Let nothing be written of troubles that are wanted."""
-    log = logging.getLogger("compax_aio")
-    usual = log.level
-    log.setLevel(logging.CRITICAL + 1)
-    try:
-        yield
-    finally:
-        log.setLevel(usual)
-
-
-@contextmanager
-def _rarely_collecting() -> Iterator[None]:
-    """Look through what is kept less often: notes are many, and none of them is garbage."""
-    usual = gc.get_threshold()
-    gc.set_threshold(_COLLECTED_AFTER, 20, 1000)
-    try:
-        yield
-    finally:
-        gc.set_threshold(*usual)
 
 
 async def _run(testimony: Seen, log_entries: int) -> None:
     loop = asyncio.get_running_loop()
-    loop.set_exception_handler(lambda _, context: testimony.complaints.append(_told(context)))
+    loop.set_exception_handler(lambda _, context: testimony.complaints.append(told(context)))
     stage = Stage(testimony)
     scenario = testimony.scenario
     for plan in scenario.drives:
@@ -93,19 +52,21 @@ async def _run(testimony: Seen, log_entries: int) -> None:
     troubles: list[asyncio.Task[None]] = []
     users: list[asyncio.Task[None]] = []
     starting = [
-        asyncio.ensure_future(_in_time(scenario.troubles, lambda each: _befall(stage, each), troubles)),
-        asyncio.ensure_future(_in_time(scenario.actions, lambda each: _act(stage, each, opening), users)),
+        asyncio.ensure_future(in_time(scenario.troubles, lambda each: _befall(stage, each), troubles)),
+        asyncio.ensure_future(in_time(scenario.actions, lambda each: _act(stage, each, opening), users)),
     ]
     begins_s = max((each.at_s for each in (*scenario.actions, *scenario.troubles)), default=0.0)
     await asyncio.wait(opening.values(), timeout=begins_s)
     await asyncio.sleep(max(0.0, begins_s - loop.time()))
-    await _all_ended(starting, testimony, "something does not begin")
-    await _all_ended([*opening.values(), *users], testimony, "a caller waits for ever")
+    await all_ended(starting, testimony.complaints, "something does not begin")
+    await all_ended([*opening.values(), *users], testimony.complaints, "a caller waits for ever")
     testimony.left_at = loop.time()
-    await _all_ended(troubles, testimony, "a trouble does not end")
+    await all_ended(troubles, testimony.complaints, "a trouble does not end")
     for axis in testimony.axes.values():
         _heal(stage, axis)
-    await _all_ended([asyncio.ensure_future(_leave(stage, axis)) for axis in stage.drives], testimony, "no leaving")
+    await all_ended(
+        [asyncio.ensure_future(_leave(stage, axis)) for axis in stage.drives], testimony.complaints, "no leaving"
+    )
     for axis in testimony.axes.values():
         axis.moving_at_end, axis.motions_at_end = axis.far.moving, len(axis.motions)
     testimony.lasted_s = loop.time()
@@ -115,13 +76,7 @@ async def _run(testimony: Seen, log_entries: int) -> None:
     for name in stage.drives:
         _weigh(stage, name)
     stage.drives.clear()
-    gc.collect(0)
-    left = asyncio.all_tasks() - {asyncio.current_task()}
-    testimony.left += [repr(task) for task in left]
-    for task in left:
-        task.cancel()
-    if left:
-        await asyncio.wait(left, timeout=LONGEST_S)
+    testimony.left += await let_go_of_tasks()
 
 
 def _build(stage: Stage, plan: DrivePlan, log_entries: int) -> None:
@@ -146,19 +101,6 @@ async def _open(stage: Stage, plan: DrivePlan) -> None:
 
 async def _connect(url: str, plan: DrivePlan) -> compax_aio.Drive:
     return await compax_aio.connect(url, name=plan.axis, settings=plan.settings)
-
-
-async def _in_time(
-    items: Iterable[_Timed], begin: Callable[[_Timed], Awaitable[None]], tasks: list[asyncio.Task[None]]
-) -> None:
-    """Begin each of *items* at its time; a day of them shall not wait side by side."""
-    loop = asyncio.get_running_loop()
-    for item in sorted(items, key=lambda each: each.at_s):
-        if item.at_s > loop.time():
-            now_is_the_time: asyncio.Future[None] = loop.create_future()
-            loop.call_at(item.at_s, now_is_the_time.set_result, None)
-            await now_is_the_time
-        tasks.append(asyncio.ensure_future(begin(item)))
 
 
 async def _befall(stage: Stage, trouble: Trouble) -> None:
@@ -208,19 +150,3 @@ async def _leave(stage: Stage, axis: str) -> None:
         for what in ("settle", "settle", "probe"):
             await stage.tell(stage.note(-1, axis, what), drive.position())
     await stage.tell(stage.note(-1, axis, "close"), drive.close())
-
-
-async def _all_ended(tasks: list[asyncio.Task[None]], testimony: Seen, complaint: str) -> None:
-    if not tasks:
-        return
-    _, waiting = await asyncio.wait(tasks, timeout=LONGEST_S)
-    if waiting:
-        testimony.complaints.append(f"{complaint}: {len(waiting)}")
-        for task in waiting:
-            task.cancel()
-        await asyncio.wait(waiting, timeout=LONGEST_S)
-
-
-def _told(context: dict[str, object]) -> str:
-    error = context.get("exception")
-    return f"{context.get('message')}: {error!r}" + (f" {error}" if isinstance(error, CompaxError) else "")

@@ -7,17 +7,18 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 from compax_aio.compax.drive import Drive
-from compax_aio.compax.moves import Move, fetch_error
+from compax_aio.compax.moves import Move
 from compax_aio.errors import CompaxError
 
+from .notes import Notes
 from .scenario import Action
-from .testimony import Call, Seen, SeenAxis
+from .testimony import Call, Seen, SeenAxis, Standing
 from .troubled_line import TroubledLine
 
 __all__ = ["Stage"]
 
 
-class Stage:
+class Stage(Notes[Call]):
     """
     What users act on.
 
@@ -30,15 +31,11 @@ class Stage:
     """
 
     def __init__(self, testimony: Seen) -> None:
+        super().__init__()
         self.testimony = testimony
         self.drives: dict[str, Drive] = {}
         self.lines: dict[str, TroubledLine] = {}
-        self._loop = asyncio.get_running_loop()
         self._followers: set[asyncio.Task[None]] = set()
-
-    def now(self) -> float:
-        """Return the time of the event loop."""
-        return self._loop.time()
 
     def axis(self, axis: str) -> SeenAxis:
         """Return what is noted of an axis."""
@@ -65,23 +62,6 @@ class Stage:
         self.axis(axis).calls.append(call)
         return call
 
-    def ended(self, call: Call, outcome: Any) -> None:
-        """Note what a caller was told just now."""
-        call.ended(self.now(), outcome, self.axis(call.axis).far)
-
-    async def tell(self, call: Call, work: Awaitable[Any]) -> Any:
-        """Await *work* on behalf of *call*; returns None if it raises one of our errors."""
-        try:
-            result = await work
-        except CompaxError as error:
-            self.ended(call, error)
-            return None
-        except BaseException as error:
-            self.ended(call, error)
-            raise
-        self.ended(call, result)
-        return result
-
     async def ask(self, action: Action, what: str, work: Callable[[Drive], Awaitable[Any]], detail: Any = None) -> Any:
         """Do one thing with the only drive of *action*."""
         (axis,) = action.axes
@@ -99,12 +79,11 @@ class Stage:
         self.follow(call, move)
         return move
 
-    def follow(self, call: Call, move: Move) -> None:
-        """Note what becomes of *move*."""
-        call.move, call.text, call.on_cancel = move, move.plan.motion, move.on_cancel
+    def far(self, axis: str) -> Standing:
+        """Return the drive at the far end."""
+        return self.axis(axis).far
 
-        def ended(_: object) -> None:
-            self.ended(call, asyncio.CancelledError() if move.cancelled() else move.exception() or move.result())
-
-        move.add_done_callback(fetch_error)
-        move.add_done_callback(ended)
+    def motion_text(self, move: Any) -> str:
+        """Return the line that starts a move, without signs."""
+        text: str = move.plan.motion
+        return text

@@ -10,9 +10,9 @@ from typing import Final
 from compax_aio.simulator.compax.log import LogKind
 
 from .promises import Broken
-from .testimony import Seen, SeenAxis
+from .testimony import Call, Seen, SeenAxis
 
-__all__ = ["story"]
+__all__ = ["merged", "short", "story"]
 
 _LONGEST_LINE: Final = 200
 _ON_THE_WIRE: Final = frozenset({LogKind.LINE, LogKind.ANSWER, LogKind.CONNECTED, LogKind.DISCONNECTED})
@@ -49,20 +49,29 @@ def _lines(axis: SeenAxis) -> Iterator[str]:
         for entry in axis.log
         if entry.kind not in _ON_THE_WIRE
     ]
+    return merged(wire, drive, axis.calls)
+
+
+def merged(
+    wire: Iterable[tuple[float, int, str]], far: Iterable[tuple[float, int, str]], calls: Iterable[Call]
+) -> Iterator[str]:
+    """Merge what happened on a line and at its far end with what was asked and told, in the order of time."""
+    calls = list(calls)
     asked = [
-        (call.asked_at, 0, f"{call.asked_at:9.4f} > {call.what} {_short(call.detail)} [{call.item}]")
-        for call in axis.calls
+        (call.asked_at, 0, f"{call.asked_at:9.4f} > {call.axis}.{call.what} {short(call.detail)} [{call.item}]")
+        for call in calls
     ]
     told = [
-        (call.ended_at, 3, f"{call.ended_at:9.4f} < {call.what} [{call.item}] told {_short(call.outcome)}")
-        for call in axis.calls
+        (call.ended_at, 3, f"{call.ended_at:9.4f} < {call.axis}.{call.what} [{call.item}] told {short(call.outcome)}")
+        for call in calls
         if call.ended_at is not None
     ]
-    merged = heapq.merge(*(sorted(part, key=lambda line: line[0]) for part in (wire, drive, asked, told)))
-    return (text[:_LONGEST_LINE] for _, _, text in merged)
+    lines = heapq.merge(*(sorted(part, key=lambda line: line[0]) for part in (wire, far, asked, told)))
+    return (text[:_LONGEST_LINE] for _, _, text in lines)
 
 
-def _short(value: object) -> str:
+def short(value: object) -> str:
+    """Write a value for people, an error in full."""
     if isinstance(value, BaseException):
         return f"{type(value).__name__}: {value}"
     return "" if value is None else repr(value)

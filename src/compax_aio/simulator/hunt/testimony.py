@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, Protocol
 
 from compax_aio.compax.events import DriveEvent
-from compax_aio.compax.moves import Move
 from compax_aio.compax.settings import DriveSettings
 from compax_aio.link.wire import readable
 from compax_aio.simulator.compax.drive import SimulatedDrive
@@ -16,7 +15,7 @@ from compax_aio.simulator.compax.log import LogEntry, LogKind
 
 from .scenario import DrivePlan, Scenario
 
-__all__ = ["Call", "Seen", "SeenAxis", "WireEntry", "WireKind", "longest_opening_s"]
+__all__ = ["Call", "Seen", "SeenAxis", "Standing", "WireEntry", "WireKind", "longest_opening_s"]
 
 _GREETING_S: Final = 5.0
 """Some fifteen queries to the slowest drive that is drawn, one answer of them lost."""
@@ -52,6 +51,18 @@ class WireEntry(NamedTuple):
         return f"{self.at:9.4f} {self.kind.value} {readable(self.data)}{self.text}"
 
 
+class Standing(Protocol):
+    """An axis at the far end, as it really stands."""
+
+    @property
+    def position(self) -> float:
+        """Where."""
+
+    @property
+    def moving(self) -> bool:
+        """Whether it moves."""
+
+
 @dataclass(slots=True, eq=False)
 class Call:
     """Something that a user has asked for, and what came of it."""
@@ -65,7 +76,8 @@ class Call:
     """What it was given, as far as a promise speaks of it."""
     text: str | None = None
     """The line that starts its motion, without signs."""
-    move: Move | None = None
+    move: Any = None
+    """The future of its motion, of whatever device."""
     on_cancel: str = "stop"
     asked_index: int = 0
     """How much had happened on the line when it was asked."""
@@ -77,10 +89,11 @@ class Call:
     """How the drive really stood when the caller was told."""
     fault_then: int | None = None
 
-    def ended(self, at: float, outcome: Any, far: SimulatedDrive) -> None:
+    def ended(self, at: float, outcome: Any, far: Standing) -> None:
         """Take note of how it ended, and of how the drive stands at this moment."""
         self.ended_at, self.outcome = at, outcome
-        self.position_then, self.moving_then, self.fault_then = far.position, far.moving, far.fault
+        self.position_then, self.moving_then = far.position, far.moving
+        self.fault_then = getattr(far, "fault", None)
 
     def __str__(self) -> str:
         ended = "never" if self.ended_at is None else f"{self.ended_at:.4f}"

@@ -10,7 +10,7 @@ from typing import Any, Final, Literal
 from compax_aio.compax.facts.line import COMMAND_END, PROMPT
 from compax_aio.errors import TransportError
 from compax_aio.simulator.compax.drive import SimulatedDrive
-from compax_aio.simulator.line import DeviceLine
+from compax_aio.simulator.line import DeviceLine, SimulatedDevice
 from compax_aio.transports.loopback import LoopbackListener, LoopbackTransport, create_pair
 
 from .testimony import WireEntry, WireKind
@@ -41,7 +41,7 @@ class Tamper:
 
 class TroubledLine(LoopbackListener):
     """
-    ``loop://name`` for a client, and at its far end a simulated drive, with all that can befall a line in between.
+    ``loop://name`` for a client, and at its far end a simulated device, with all that can befall a line in between.
 
     Args:
         name: Of the line.
@@ -58,7 +58,7 @@ class TroubledLine(LoopbackListener):
     """
 
     def __init__(
-        self, name: str, device: SimulatedDrive, wire: list[WireEntry], strangers: list[SimulatedDrive] | None = None
+        self, name: str, device: SimulatedDevice, wire: list[WireEntry], strangers: list[SimulatedDrive] | None = None
     ) -> None:
         super().__init__(name, asyncio.Protocol)
         self.delay_s: dict[Direction, float] = {"to_drive": 0.0, "to_host": 0.0}
@@ -132,7 +132,7 @@ class TroubledLine(LoopbackListener):
         line = DeviceLine.of(self._device)
         line.receive(data)
 
-    def exchange_device(self, device: SimulatedDrive) -> None:
+    def exchange_device(self, device: SimulatedDevice) -> None:
         """Let whoever connects next find *device*."""
         if self._kept is not None:
             self._kept = None

@@ -201,14 +201,17 @@ class Knobs:
     stick: _Probability = 0.0
     """For each character that arrives: nothing goes to the host for ``stick_s``."""
     stick_s: _Seconds = 1.0
+    """How long that lasts."""
     late_answer: _Probability = 0.0
-    """For each command: it is executed ``late_s`` later."""
+    """For each command: it is executed in time, and its answer comes ``late_s`` later."""
     late_s: _Seconds = 1.0
+    """How much later."""
     spontaneous_reset: _Probability = 0.0
     """For each character that an axis reads: it resets itself."""
     jog: _Probability = 0.0
     """For each character that an axis reads while it stands: somebody moves it by ``jog_distance``."""
     jog_distance: Annotated[float, Range(-1e6, 1e6)] = 100.0
+    """In steps; below zero toward minus."""
 
     def __post_init__(self) -> None:
         check_knobs(self, _DEVICE)

@@ -1,0 +1,1 @@
+"""The hunt on a party line: whole applications with several SMC axes in trouble, each from one seed."""
