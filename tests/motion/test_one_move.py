@@ -473,3 +473,15 @@ async def test_a_move_that_may_go_on_goes_on_and_its_holder_is_told(motion: Moti
     with pytest.raises(ConnectionLostError, match=r"move_to\(1\) goes on unwatched"):
         await move
     assert motion.wire == ["move_to(1)"]
+
+
+async def test_a_defect_in_watching_a_move_stops_the_device_and_ends_the_move() -> None:
+    motion = Motion()
+    move, pursuit = motion.move(5)
+    pursuit.may_send.set()
+    await move.accepted
+    pursuit.ending.set_exception(ZeroDivisionError("not foreseen"))
+    motion.standstill.set_result(3.0)
+    with pytest.raises(MoveStoppedError, match="ZeroDivisionError: not foreseen"):
+        await asyncio.wait_for(move, 10)
+    assert motion.stops == 1

@@ -302,16 +302,19 @@ class Link(asyncio.Protocol):
             return not self.is_over
         return exchange.survives_loss and self._reconnecting is not None
 
-    def preempt(self, text: str) -> None:
+    def preempt(self, text: str) -> asyncio.Future[None]:
         """
         Write *text*, which the device heeds at any time, at once; what is outstanding is over by it.
+
+        Returns:
+            A future that is done when the line is in step again; it raises CompaxError if that fails.
 
         Raises:
             ConnectionLostError: There is no line; nothing was sent.
         """
         if not self._port.is_there or self.is_over:
             raise self._lost(None)
-        self._turns.preempt(text)
+        return self._turns.preempt(text)
 
     def hold_reads(self, for_s: float) -> None:
         """Let what waits in ``Lane.READ`` wait on, at most *for_s* from now; what is on the wire goes on."""

@@ -152,13 +152,17 @@ class Turns:
         self._unproved.clear()
         self.pump()
 
-    def preempt(self, text: str) -> None:
-        """Write *text*, which the device heeds at any time; what is outstanding is over by it."""
+    def preempt(self, text: str) -> asyncio.Future[None]:
+        """Write *text*, which the device heeds at any time; done when the line is in step again, or nobody answers."""
         self._protocol.preempt(text)
         self._flush()
         self._take_events()
         self._begin_doubt()
         self._give_time()
+        if self._in_step is None or self._in_step.done():
+            self._in_step = self.until_in_step()
+            self._in_step.add_done_callback(lambda each: each.cancelled() or each.exception())  # if nobody asks
+        return self._in_step
 
     def end(self) -> None:
         """Send nothing any more."""

@@ -182,10 +182,7 @@ class OneMove(ABC, Generic[_Pursuit, _Standstill, _Answer]):
 
     async def _pursue(self, pursuit: _Pursuit) -> None:
         try:
-            if self._stopping is not None:
-                await self._until_stopped(pursuit.times_opened)
-                self._refuse_in_doubt(pursuit.move.description)
-            await pursuit.carry_out()
+            await self._take_turn(pursuit)
         except MustStop as order:
             if self._is_active(pursuit.move):
                 self.begin_stop(order.reason)
@@ -194,6 +191,11 @@ class OneMove(ABC, Generic[_Pursuit, _Standstill, _Answer]):
             if isinstance(error, MoveInDoubtError) and pursuit.move.is_on_wire:
                 self.untracked.note()
             pursuit.move.fail(error)
+        except Exception as defect:
+            # A defect, here or in a caller's own code: the device must not go on with nobody watching it.
+            if self._is_active(pursuit.move):
+                self.begin_stop(self._reports.defect(pursuit.move, defect))
+            raise
         except asyncio.CancelledError:
             # Either the move was taken from here, or the event loop is ending: then the drive must not go on alone.
             if self._is_active(pursuit.move):
@@ -202,6 +204,12 @@ class OneMove(ABC, Generic[_Pursuit, _Standstill, _Answer]):
             if self._stopping is not None:
                 await asyncio.wait([self._stopping])
             raise
+
+    async def _take_turn(self, pursuit: _Pursuit) -> None:
+        if self._stopping is not None:
+            await self._until_stopped(pursuit.times_opened)
+            self._refuse_in_doubt(pursuit.move.description)
+        await pursuit.carry_out()
 
     async def _until_stopped(self, times_opened: int) -> None:
         """Wait for a stop that is under way; what shall follow it is not said on a line that came back meanwhile."""

@@ -70,6 +70,18 @@ class MoveReports:
         """Report a line that was closed while not even a stop should be sent on it."""
         return MoveInDoubtError(f"the line was closed without a stop, for {why}", device=self._name, hint=remedy)
 
+    def defect(self, move: MoveFuture, defect: Exception) -> MoveStoppedError:
+        """Report a move whose watching ended by an exception that nobody has foreseen."""
+        error = MoveStoppedError(
+            f"{move.description} was not watched any more, and was stopped: {type(defect).__name__}: {defect}",
+            device=self._name,
+            sent=move.sent,
+            hint="that is a defect of this library: please report it with its traceback",
+            exchanges=self._link.recent(),
+        )
+        error.__cause__ = defect
+        return error
+
     def out_of_time(self, move: MoveFuture, timeout_s: float) -> MoveTimeoutError:
         """Report a move whose budget is used up."""
         done = "was stopped" if move.is_on_wire else "was not sent"

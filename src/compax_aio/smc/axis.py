@@ -236,6 +236,10 @@ class SmcAxis:
         """Queue a soft stop, which ends at standstill; *why* says what has stopped a move that runs, if not that."""
         return self._motion.begin_stop(None if why is None else self._motion.cut_off(why))
 
+    def withdraw(self, why: str) -> None:
+        """Let no motion that waits for its turn be sent; it raises *why*."""
+        self._motion.withdraw(why)
+
     def note_damage(self, holds: tuple[str, ...]) -> None:
         """Take note that it may execute one of *holds*, which is left of a command that was damaged on the line."""
         if self._motion.is_storing:

@@ -149,8 +149,15 @@ class AxisMotion(OneMove[Pursuit, Look, str]):
             on_sent()
 
         line, axis = self._observer.line, self._observer.axis
+        before, known_loss = self._observer.standing_at, self._observer.lost_reference
         outcome = await line.start(axis, text, lane, written)
         if isinstance(outcome, EntryFailed) and not outcome.was_begun:
+            # It may have kept silent because it was reset, and count from elsewhere now.
+            if before is not None:
+                self._observer.note_standing(before)
+            await self.refuse_if_moving(repr(text))
+            if (why := self._observer.lost_reference) is not None and why != known_loss:
+                raise self._axis_reports.no_reference(repr(text), why)
             outcome = await line.start(axis, text, lane, written)
         is_known = text[0] in COMMANDS
         if isinstance(outcome, Answered) and not is_known and outcome.text not in line.settings.profile.refusals:
@@ -237,6 +244,12 @@ class AxisMotion(OneMove[Pursuit, Look, str]):
 
     def _conclude_stopped(self, pursuit: Pursuit, standstill: Look, reason: MoveError | None) -> None:
         pursuit.conclude_stopped(standstill, reason)
+
+    def withdraw(self, why: str) -> None:
+        """Let no motion that waits for its turn be sent."""
+        self.untracked.take_back()
+        if self._active is not None and not self._active.move.is_on_wire:
+            self._withdraw(self._active.move, self.cut_off(why))
 
     @property
     def is_watched(self) -> bool:

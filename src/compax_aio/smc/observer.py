@@ -49,10 +49,14 @@ class Observer:
         self._on_lost_reference = on_lost_reference
         self.name = line.called(axis)
         self.last_position: float | None = None
+        self._may_move = False
+        """Whether something was told since it was known to stand, that may move it."""
         self.standing_at: float | None = None
         """Where it stood when it was last known to stand, and nothing was told since that moves it."""
         self.lost_reference: str | None = None
         """Why the position counts from nobody knows where; None if it is not known to."""
+        self.times_lost = 0
+        """How often that was noted: positions before and after cannot be compared."""
 
     async def status(self, lane: Lane = Lane.CONTROL) -> AxisStatus:
         """Read the motion status."""
@@ -60,8 +64,11 @@ class Observer:
 
     async def position(self, lane: Lane = Lane.CONTROL) -> float:
         """Read the position in steps, and remember it."""
-        self.last_position = await self.line.position(self.axis, lane)
-        return self.last_position
+        position = await self.line.position(self.axis, lane)
+        self.last_position = position
+        if not self._may_move:
+            self.note_standing(position)
+        return position
 
     async def look(self, lane: Lane = Lane.CONTROL) -> Look:
         """Read status and position, and take note of what they say about a reset."""
@@ -72,17 +79,20 @@ class Observer:
 
     def note_standing(self, position: float) -> None:
         """Take note of where the axis stands; one that was elsewhere and counts 0 now has been reset, as it seems."""
+        self._may_move = False
         before, self.standing_at = self.standing_at, position
         if before is not None and position == 0.0 and not self.is_near(before, 0.0):
             self.find_reference_lost(f"it stood at {self.written(before)} and counts 0 now, as after a reset")
 
     def note_moving(self) -> None:
         """Take note that it may be anywhere from now on."""
+        self._may_move = True
         self.standing_at = None
 
     def lose_reference(self, why: str) -> None:
         """Take note that nobody knows what the position is counted from; the first reason is kept."""
         self.standing_at = None
+        self.times_lost += 1
         self.lost_reference = self.lost_reference or why
 
     def find_reference_lost(self, why: str) -> None:

@@ -200,13 +200,15 @@ class PartyLine:
 
     async def _preempt(self, key: int, what: str, take_note: Callable[[SmcAxis], None]) -> None:
         try:
-            self._line.link.preempt(chr(key))
+            in_step = self._line.link.preempt(chr(key))
         except ConnectionLostError:
             await self._until_standing(None)  # what moves is stopped when the line is back, if it is soon enough
             raise
         for axis in self._axes.values():
             take_note(axis)
         await self._until_standing(what)
+        if not self._axes:
+            await asyncio.shield(in_step)  # nobody else shows that it has gone out
 
     async def _until_standing(self, why: str | None) -> None:
         stops = [axis.begin_stop(why) for axis in self._axes.values()]
@@ -335,10 +337,15 @@ class PartyLine:
 
     def _note_names_dealt(self, event: NamesDealt) -> None:
         self._returned = event.returned
-        if self._was_open:
-            names, expected = names_between(event.offered, event.returned), "".join(self._axes)
-            self._line.wrong_names = "" if names == expected else f"the chain has taken {names!r}, not {expected!r}"
-        self._lose_references("the names of the chain were dealt anew, as after a reset")
+        if not self._was_open:
+            return
+        names, expected = names_between(event.offered, event.returned), "".join(self._axes)
+        self._line.wrong_names = "" if names == expected else f"the chain has taken {names!r}, not {expected!r}"
+        why = "the names of the chain were dealt anew, as after a reset"
+        self._lose_references(why)
+        if not self._own_resets:
+            for axis in self._axes.values():
+                axis.withdraw(why)  # what waits to be sent was meant for another place, or another controller
 
     def _on_lost_reference(self, axis: str, why: str) -> None:
         self._events.publish(AxesReset(self.name, self._loop.time(), axis, why))

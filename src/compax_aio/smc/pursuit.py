@@ -67,6 +67,7 @@ class Pursuit:
         self._start = 0.0
         self._seen_at = 0.0
         """Where it was on the way, or before."""
+        self._times_lost = 0
 
     async def carry_out(self) -> None:
         """
@@ -93,6 +94,7 @@ class Pursuit:
         if plan.kind is MotionKind.MOVE_TO and (why := self._observer.lost_reference) is not None:
             raise self._reports.no_reference(plan.description, why)
         self._start = self._seen_at = look.position
+        self._times_lost = self._observer.times_lost
         if plan.distance is not None:
             self.move.target = self._checked(round(look.position + plan.distance, self._profile.decimals))
 
@@ -159,7 +161,7 @@ class Pursuit:
                 self._note_count(look)
                 error.hint = f"the axis stands at {self._observer.written(look.position)}: " + (
                     "it was not taken; command it again if you want it"
-                    if self._observer.is_near(look.position, self._start)
+                    if self._counts_on and self._observer.is_near(look.position, self._start)
                     else "it ended before its target, or the position is lost; look at the machine"
                 )
                 raise error
@@ -248,8 +250,14 @@ class Pursuit:
 
     # Small things ---------------------------------------------------------------------------------------------------
 
+    @property
+    def _counts_on(self) -> bool:
+        """Whether the axis still counts from where it did when the motion was planned, as far as is known."""
+        return self._observer.times_lost == self._times_lost
+
     def _is_at_target(self, look: Look) -> bool:
-        return self.move.target is not None and self._observer.is_near(look.position, self.move.target)
+        target = self.move.target
+        return target is not None and self._counts_on and self._observer.is_near(look.position, target)
 
     def _note_count(self, look: Look) -> None:
         """Take note of a position that is nowhere on the way: an axis that counts 0 there has been reset, it seems."""

@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 from ..errors import CompaxError, MoveActiveError, MoveError, MoveStoppedError, MoveTimeoutError
 from ..motion.reports import MoveReports
 from .moves import AxisMove
 from .observer import Look, Observer
 
 __all__ = ["AxisReports"]
-
-_LIKE_RESET: Final = (
-    "0 is also what it counts after a reset (power, ^C): look at the machine, and home() it if it was one"
-)
 
 
 class AxisReports(MoveReports):
@@ -136,4 +130,5 @@ class AxisReports(MoveReports):
         )
 
     def _doubtful_count(self) -> str | None:
-        return _LIKE_RESET if self._observer.lost_reference is not None else None
+        why = self._observer.lost_reference
+        return None if why is None else f"its position means nothing: {why}; look at the machine, and home() it"

@@ -17,7 +17,7 @@ from .actions import ACTIONS
 from .scenario import PartyScenario
 from .stage import PartyStage
 from .testimony import WHOLE_LINE, SeenLine
-from .troubles import FarLine, befall
+from .troubles import LONGEST_DELAY_S, FarLine, befall
 
 __all__ = ["simulate_party"]
 
@@ -66,6 +66,7 @@ async def _run(testimony: SeenLine) -> None:
     testimony.left_at = loop.time()
     await all_ended(troubles, testimony.complaints, "a trouble does not end")
     _heal(line, testimony.far)
+    await asyncio.sleep(LONGEST_DELAY_S)  # what was late is there now
     if stage.line is not None:
         await all_ended([asyncio.ensure_future(_leave(stage, stage.line))], testimony.complaints, "no leaving")
         testimony.weight = weigh(stage.line)

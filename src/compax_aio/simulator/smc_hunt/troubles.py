@@ -14,11 +14,12 @@ from compax_aio.simulator.smc.line import SimulatedPartyLine
 from ..hunt.scenario import Trouble
 from ..hunt.troubled_line import Tamper, TroubledLine
 
-__all__ = ["LASTS_S", "TROUBLES", "FarLine", "TroubleKind", "befall"]
+__all__ = ["LASTS_S", "LONGEST_DELAY_S", "TROUBLES", "FarLine", "TroubleKind", "befall"]
 
 LASTS_S: Final = (0.0, 0.003, 0.02, 0.06, 0.2, 0.4, 0.7, 1.5, 5.0)
 _NOISE: Final = (b"\x00", b"\n", b"\n\n", b"A", b"1", b"0\n", b"\xff\xfe", b"Z 5\n", b"#\r\n", b"   1342 ADVANCED")
 _DELAYS_S: Final = (0.001, 0.01, 0.06, 0.11, 0.26, 0.45, 1.1)
+LONGEST_DELAY_S: Final = max(_DELAYS_S)
 
 Arguments = dict[str, Any]
 

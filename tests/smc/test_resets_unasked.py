@@ -1,0 +1,55 @@
+"""A reset that nobody was told of: it is noticed, and what was meant for another place is not sent."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+from tests.smc.bench import bench, motions, outcome, until
+
+from compax_aio.errors import CompaxError, MoveError, MoveStoppedError
+from compax_aio.simulator.smc import LogKind
+
+pytestmark = pytest.mark.usefixtures("nothing_left_behind")
+
+
+async def test_a_motion_that_waits_while_a_chain_deals_its_names_anew_is_never_sent() -> None:
+    async with bench(axes="AB", mode="daisy", baudrate=9600, fails_to_close=True) as (line, far, _):
+        await line.axis("B").move_by(40)
+        far.power_cycle()
+        await asyncio.sleep(1)
+        asking = asyncio.ensure_future(line.axis("A").position())
+        await asyncio.sleep(0)
+        assert isinstance(await outcome(line.axis("B").move_by(500)), CompaxError)
+        await outcome(asking)
+        await asyncio.sleep(5)
+        assert [text for text in motions(far) if "500" in text] == []
+
+
+async def test_a_reset_of_axes_that_nobody_has_named_has_gone_out_when_it_returns() -> None:
+    async with bench(axes="AB", connects="") as (line, far, _):
+        await line.reset()
+        assert far.log.texts(LogKind.RESET)[-2:] == ["^C", "^C"]
+
+
+async def test_a_position_that_was_asked_shows_a_reset_as_well() -> None:
+    async with bench(axes="A", connects="", position=20000.0) as (line, far, _):
+        axis = line.axis("A")
+        assert await axis.position() == 20000
+        far.axes["A"].reset()
+        await asyncio.sleep(1)
+        assert await axis.position() == 0
+        assert axis.lost_reference is not None
+        with pytest.raises(MoveError):
+            axis.move_to(100)
+
+
+async def test_a_move_that_a_reset_has_ended_at_its_target_is_not_told_as_arrived() -> None:
+    """An axis may keep its count through a reset; who knows that it does?"""
+    async with bench(axes="A", reset_keeps_position=True) as (line, far, _):
+        move = line.axis("A").move_to(2000)
+        await move.accepted
+        await until(lambda: not far.axes["A"].moving)
+        await line.reset()
+        assert isinstance(await outcome(move), MoveStoppedError)
+        assert far.axes["A"].position == 2000
