@@ -16,13 +16,11 @@ from typing import Final
 
 from ..errors import LinkProtocolError
 from ..link.contract import Event, GoesOn, Hold, InStep, MarkerSpent, Stranger
+from .clearing import Clearing, Steps
 from .facts import (
-    BACKSPACE,
-    ESCAPE,
     LINE_FEED,
     MAX_COMMAND_LENGTH,
     PROMPT,
-    RESET,
     SPACE,
     Mode,
     Reply,
@@ -37,10 +35,6 @@ __all__ = ["SmcProtocol"]
 _MOST_OF_A_RESULT: Final = 64
 _MOST_OF_A_LISTING: Final = 16_384
 _MOST_OF_A_STRAY: Final = 64
-_ESCAPE_AGAIN_S: Final = 0.005
-"""The first one may have fallen on a character that the controller had not read yet; it does no harm twice."""
-_BACKSPACE_S: Final = 0.03
-_NAMING_S: Final = 0.1
 
 
 class SmcProtocol:
@@ -62,6 +56,7 @@ class SmcProtocol:
         """What is typed, or was typed last."""
         self._echoed = 0
         self._received = bytearray()
+        self._clearer = Clearing(mode, settings)
         self._clearing: deque[tuple[bytes, float]] = deque()
         self._pause_s = 0.0
         self._probe = ""
@@ -145,7 +140,7 @@ class SmcProtocol:
         """
         if self.state in {State.TYPING, State.ENDING, State.LISTING}:
             self._events.append(CutShort(self._text, text, was_complete=self.state is not State.TYPING))
-        steps = self._overtaking(self._escape() if text == chr(ESCAPE) else self._reset(text), text)
+        steps = self._clearer.preempting(text, tuple(self._clearing))
         self._step(Step.PREEMPTED)
         self._to_send.clear()
         self._may_hold = 0
@@ -319,43 +314,12 @@ class SmcProtocol:
     # Getting in step ------------------------------------------------------------------------------------------------
 
     def _begin_probe(self, text: str) -> None:
-        steps = self._clearing_steps()
+        steps = self._clearer.after_command(self._may_hold, is_half_typed=self.state is State.HALF_TYPED)
         self._step(Step.MARKER_SENT)
         self._probe = text
         self._clear(steps)
 
-    def _clearing_steps(self) -> list[tuple[bytes, float]]:
-        """Say what empties the buffers when a command was not ended, each with the pause after it."""
-        if self.state is State.HALF_TYPED and self._settings.cancel_with == "escape":
-            return self._escape()
-        if self._mode.has_names:
-            return [(bytes((LINE_FEED,)), self._settings.quiet_s)]
-        # A blank first: were it just reset, any other character would become its name (DCB p. 23).
-        backspaces = [(bytes((BACKSPACE,)), _BACKSPACE_S)] * (self._may_hold + 1)
-        return [(bytes((SPACE,)), self._settings.sign_on_s), *backspaces]
-
-    def _escape(self) -> list[tuple[bytes, float]]:
-        escape = bytes((ESCAPE,))
-        steps = [(escape, _ESCAPE_AGAIN_S), (escape, self._settings.escape_quiet_s)]
-        return [*steps, (bytes((LINE_FEED,)), self._settings.quiet_s)] if self._mode.has_names else steps
-
-    def _reset(self, text: str) -> list[tuple[bytes, float]]:
-        """^C, once: a second one would become the name of a single axis (DCB p. 23)."""
-        steps = [(b"", self._settings.quiet_s), (bytes((RESET,)), self._settings.profile.reset_time_s)]
-        if self._mode.has_names:
-            return [*steps, (bytes((LINE_FEED,)), self._settings.quiet_s)]
-        naming = [(text[1:].encode("latin-1"), _NAMING_S)] if text[1:] else []
-        return [*steps, *naming, (bytes((SPACE,)), self._settings.sign_on_s)]
-
-    def _overtaking(self, steps: list[tuple[bytes, float]], text: str) -> list[tuple[bytes, float]]:
-        """Say what is sent when a reset is under way already."""
-        left = [data for data, _ in self._clearing]
-        if text == chr(ESCAPE) and bytes((RESET,)) in left:
-            return [*steps, *self._clearing]  # who asked for the reset will be told that it was
-        # A single axis that was reset takes what comes first for its name (DCB p. 23), unless it is a blank.
-        return [(bytes((SPACE,)), _ESCAPE_AGAIN_S), *steps] if bytes((SPACE,)) in left else steps
-
-    def _clear(self, steps: list[tuple[bytes, float]]) -> None:
+    def _clear(self, steps: Steps) -> None:
         self._clearing.clear()
         self._clearing.extend(steps)
         self._send_clearing()
@@ -365,8 +329,9 @@ class SmcProtocol:
         self._may_hold = min(self._may_hold + characters, MAX_COMMAND_LENGTH + 1)
 
     def _send_clearing(self) -> None:
-        data, self._pause_s = self._clearing.popleft()
-        self._wants_sign_on = data == bytes((SPACE,)) and self._pause_s == self._settings.sign_on_s
+        step = self._clearing.popleft()
+        data, self._pause_s = step
+        self._wants_sign_on = self._clearer.wants_sign_on(step)
         self._is_heard = False
         self._to_send.append(data)
 
