@@ -7,15 +7,15 @@ from collections.abc import Awaitable, Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from random import Random
-from typing import Any, Final
+from typing import Final
 
 from compax_aio.compax.facts.line import PROMPT
-from compax_aio.simulator.clock import VirtualClockLoop
 from compax_aio.simulator.compax.drive import SimulatedDrive
 from compax_aio.simulator.compax.instructions import MoveTo, Stop
 from compax_aio.simulator.compax.knobs import Knobs
 from compax_aio.simulator.compax.refusals import RefusedError
 
+from .line_troubles import Arguments, cut, half_open, hold, nothing, one_of, other_host, slow_line, stall, tamper
 from .scenario import Trouble
 from .troubled_line import Tamper, TroubledLine
 
@@ -28,8 +28,6 @@ _STRANGER_SAYS_EVERY_S: Final = 0.01
 LASTS_S: Final = (0.0, 0.003, 0.02, 0.05, 0.2, 0.4, 0.7, 1.5, 6.0)
 _HALF_LINES: Final = (b"PA5", b"POSR 1", b"PA17.5$", b"S1", b"P40=", b"GOTO", b"SD 1", b"?", b"S0", b"PR3 SD")
 _NOISE: Final = (b"\x00\xff", b"\xa5?", b"?\r\n", b"S0", b"\r\n", b">", b"\xc1\xc1\xc1", b"\x13", b"\x11", PROMPT, b"E")
-
-Arguments = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,19 +71,8 @@ def _draw_tamper(random: Random) -> Arguments:
     }
 
 
-async def _tamper(far: Far, trouble: Trouble) -> None:
-    far.line.add(Tamper(**trouble.arguments))
-
-
 async def _lose_end(far: Far, _: Trouble) -> None:
     far.line.add(Tamper("to_drive", "lose_end"))
-
-
-async def _slow_line(far: Far, trouble: Trouble) -> None:
-    direction = trouble.arguments["direction"]
-    far.line.delay_s[direction] = trouble.arguments["delay_s"]
-    await asyncio.sleep(trouble.lasts_s)
-    far.line.delay_s[direction] = 0.0
 
 
 async def _pieces(far: Far, trouble: Trouble) -> None:
@@ -98,32 +85,10 @@ async def _repeat(far: Far, _: Trouble) -> None:
     far.line.repeat()
 
 
-async def _hold(far: Far, trouble: Trouble) -> None:
-    far.line.hold(held=True)
-    await asyncio.sleep(trouble.lasts_s)
-    far.line.hold(held=False)
-
-
-async def _cut(far: Far, trouble: Trouble) -> None:
-    far.line.refused = True
-    far.line.keeps = trouble.arguments.get("keeps", False)
-    far.line.cut()
-    await asyncio.sleep(trouble.lasts_s)
-    far.line.refused = far.line.keeps = False
-
-
 async def _flapping(far: Far, trouble: Trouble) -> None:
     for _ in range(trouble.arguments["times"]):
         far.line.cut()
         await asyncio.sleep(trouble.arguments["every_s"])
-
-
-async def _half_open(far: Far, trouble: Trouble) -> None:
-    far.line.vanishing = True
-    await asyncio.sleep(trouble.lasts_s)
-    far.line.vanishing = False
-    if trouble.arguments.get("is_cut"):
-        far.line.cut()
 
 
 async def _blackout(far: Far, trouble: Trouble) -> None:
@@ -150,10 +115,6 @@ async def _stranger(far: Far, trouble: Trouble) -> None:
     await asyncio.sleep(max(0.0, begun_at + trouble.lasts_s - asyncio.get_running_loop().time()))
     far.line.exchange_device(far.drive)
     far.line.cut()
-
-
-async def _other_host(far: Far, trouble: Trouble) -> None:
-    far.line.from_elsewhere(trouble.arguments["data"])
 
 
 # The drive --------------------------------------------------------------------------------------------------------
@@ -229,54 +190,40 @@ async def _panel_stop(far: Far, _: Trouble) -> None:
         drive.served_by.changed()
 
 
-async def _stall(_: Far, trouble: Trouble) -> None:
-    loop = asyncio.get_running_loop()
-    assert isinstance(loop, VirtualClockLoop)
-    loop.jump(trouble.arguments["stall_s"])
-
-
-def _nothing(_: Random) -> Arguments:
-    return {}
-
-
-def _one_of(**choices: tuple[Any, ...]) -> Callable[[Random], Arguments]:
-    return lambda random: {name: random.choice(values) for name, values in choices.items()}
-
-
 _DELAYS_S: Final = (0.001, 0.01, 0.05, 0.25, 0.31, 0.35, 0.8)
 
 TROUBLES: Final[Mapping[str, TroubleKind]] = {
-    "tamper": TroubleKind(6, _draw_tamper, _tamper, forges=True),
-    "lose end": TroubleKind(1.5, _nothing, _lose_end),
-    "slow line": TroubleKind(3, _one_of(direction=("to_drive", "to_host"), delay_s=_DELAYS_S), _slow_line),
-    "pieces": TroubleKind(2, _one_of(size=(1, 2, 3, 5)), _pieces),
-    "repeat": TroubleKind(1.5, _nothing, _repeat, forges=True),
-    "hold": TroubleKind(1.5, _nothing, _hold),
-    "cut": TroubleKind(2, _one_of(keeps=(False, False, True)), _cut, reconnecting=4),
-    "flapping": TroubleKind(0, _one_of(times=(2, 3, 8), every_s=(0.01, 0.06, 0.3, 0.7)), _flapping, reconnecting=1),
-    "half open": TroubleKind(1, _one_of(is_cut=(False, True)), _half_open, reconnecting=1.5),
+    "tamper": TroubleKind(6, _draw_tamper, tamper, forges=True),
+    "lose end": TroubleKind(1.5, nothing, _lose_end),
+    "slow line": TroubleKind(3, one_of(direction=("to_drive", "to_host"), delay_s=_DELAYS_S), slow_line),
+    "pieces": TroubleKind(2, one_of(size=(1, 2, 3, 5)), _pieces),
+    "repeat": TroubleKind(1.5, nothing, _repeat, forges=True),
+    "hold": TroubleKind(1.5, nothing, hold),
+    "cut": TroubleKind(2, one_of(keeps=(False, False, True)), cut, reconnecting=4),
+    "flapping": TroubleKind(0, one_of(times=(2, 3, 8), every_s=(0.01, 0.06, 0.3, 0.7)), _flapping, reconnecting=1),
+    "half open": TroubleKind(1, one_of(is_cut=(False, True)), half_open, reconnecting=1.5),
     "blackout": TroubleKind(
-        0, _one_of(later_s=(0.0, 0.05, 0.3), off_s=(0.0, 0.05, 0.3, 4.0)), _blackout, reconnecting=2
+        0, one_of(later_s=(0.0, 0.05, 0.3), off_s=(0.0, 0.05, 0.3, 4.0)), _blackout, reconnecting=2
     ),
     "stranger": TroubleKind(
         0,
-        _one_of(position=(4321.0, 8765.0), fault=(None, None, 20), says=(b"", b"$\r\n>", b"$\r\n>", b"1\r\n>")),
+        one_of(position=(4321.0, 8765.0), fault=(None, None, 20), says=(b"", b"$\r\n>", b"$\r\n>", b"1\r\n>")),
         _stranger,
         reconnecting=3,
     ),
-    "other host": TroubleKind(1, _one_of(data=_HALF_LINES), _other_host, forges=True),
-    "silent": TroubleKind(2, _nothing, _silent),
-    "deaf": TroubleKind(2, _nothing, _deaf),
-    "slow": TroubleKind(3, _one_of(delay_s=_DELAYS_S), _slow),
-    "lose answers": TroubleKind(3, _one_of(count=(1, 1, 2, 3)), _lose_answers),
-    "lose message": TroubleKind(1.5, _nothing, _lose_message),
-    "late message": TroubleKind(1.5, _one_of(delay_s=_DELAYS_S), _late_message),
-    "fault": TroubleKind(1.5, _one_of(code=(20, 55, 53, 70)), _fault),
-    "power": TroubleKind(1, _nothing, _power),
-    "noise": TroubleKind(1.5, _one_of(data=_NOISE), _noise, forges=True),
-    "flood": TroubleKind(0.3, _one_of(pieces=(3, 20, 300), data=(b"\x55", b"S001", b"\r\n")), _flood, forges=True),
-    "panel": TroubleKind(0.7, _nothing, _panel),
-    "panel stop": TroubleKind(1, _nothing, _panel_stop),
-    "stall": TroubleKind(1, _one_of(stall_s=(0.01, 0.2, 0.5, 3.0)), _stall),
+    "other host": TroubleKind(1, one_of(data=_HALF_LINES), other_host, forges=True),
+    "silent": TroubleKind(2, nothing, _silent),
+    "deaf": TroubleKind(2, nothing, _deaf),
+    "slow": TroubleKind(3, one_of(delay_s=_DELAYS_S), _slow),
+    "lose answers": TroubleKind(3, one_of(count=(1, 1, 2, 3)), _lose_answers),
+    "lose message": TroubleKind(1.5, nothing, _lose_message),
+    "late message": TroubleKind(1.5, one_of(delay_s=_DELAYS_S), _late_message),
+    "fault": TroubleKind(1.5, one_of(code=(20, 55, 53, 70)), _fault),
+    "power": TroubleKind(1, nothing, _power),
+    "noise": TroubleKind(1.5, one_of(data=_NOISE), _noise, forges=True),
+    "flood": TroubleKind(0.3, one_of(pieces=(3, 20, 300), data=(b"\x55", b"S001", b"\r\n")), _flood, forges=True),
+    "panel": TroubleKind(0.7, nothing, _panel),
+    "panel stop": TroubleKind(1, nothing, _panel_stop),
+    "stall": TroubleKind(1, one_of(stall_s=(0.01, 0.2, 0.5, 3.0)), stall),
 }
 """By name. What forges may excuse that a value, or a motion, is not what its sender meant."""

@@ -6,13 +6,13 @@ import asyncio
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 from random import Random
-from typing import Any, Final
+from typing import Final
 
-from compax_aio.simulator.clock import VirtualClockLoop
 from compax_aio.simulator.smc.line import SimulatedPartyLine
 
+from ..hunt.line_troubles import Arguments, cut, half_open, hold, nothing, one_of, other_host, slow_line, stall, tamper
 from ..hunt.scenario import Trouble
-from ..hunt.troubled_line import Tamper, TroubledLine
+from ..hunt.troubled_line import TroubledLine
 
 __all__ = ["LASTS_S", "LONGEST_DELAY_S", "TROUBLES", "FarLine", "TroubleKind", "befall"]
 
@@ -20,8 +20,6 @@ LASTS_S: Final = (0.0, 0.003, 0.02, 0.06, 0.2, 0.4, 0.7, 1.5, 5.0)
 _NOISE: Final = (b"\x00", b"\n", b"\n\n", b"A", b"1", b"0\n", b"\xff\xfe", b"Z 5\n", b"#\r\n", b"   1342 ADVANCED")
 _DELAYS_S: Final = (0.001, 0.01, 0.06, 0.11, 0.26, 0.45, 1.1)
 LONGEST_DELAY_S: Final = max(_DELAYS_S)
-
-Arguments = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,38 +62,6 @@ def _draw_tamper(random: Random) -> Arguments:
     }
 
 
-async def _tamper(far: FarLine, trouble: Trouble) -> None:
-    far.line.add(Tamper(**trouble.arguments))
-
-
-async def _slow_line(far: FarLine, trouble: Trouble) -> None:
-    direction = trouble.arguments["direction"]
-    far.line.delay_s[direction] = trouble.arguments["delay_s"]
-    await asyncio.sleep(trouble.lasts_s)
-    far.line.delay_s[direction] = 0.0
-
-
-async def _hold(far: FarLine, trouble: Trouble) -> None:
-    far.line.hold(held=True)
-    await asyncio.sleep(trouble.lasts_s)
-    far.line.hold(held=False)
-
-
-async def _cut(far: FarLine, trouble: Trouble) -> None:
-    far.line.refused = True
-    far.line.cut()
-    await asyncio.sleep(trouble.lasts_s)
-    far.line.refused = False
-
-
-async def _half_open(far: FarLine, trouble: Trouble) -> None:
-    far.line.vanishing = True
-    await asyncio.sleep(trouble.lasts_s)
-    far.line.vanishing = False
-    if trouble.arguments["is_cut"]:
-        far.line.cut()
-
-
 async def _blackout(far: FarLine, trouble: Trouble) -> None:
     """Let the power of line and axes fail, the line's a little before or after."""
     far.line.refused = True
@@ -117,10 +83,6 @@ async def _flood(far: FarLine, trouble: Trouble) -> None:
     for _ in range(trouble.arguments["pieces"]):
         far.party.inject(trouble.arguments["data"] * 100)
         await asyncio.sleep(0.002)
-
-
-async def _other_host(far: FarLine, trouble: Trouble) -> None:
-    far.line.from_elsewhere(trouble.arguments["data"])
 
 
 # The axes ---------------------------------------------------------------------------------------------------------
@@ -173,44 +135,29 @@ async def _power(far: FarLine, trouble: Trouble) -> None:
     far.party.power_on()
 
 
-async def _stall(far: FarLine, trouble: Trouble) -> None:
-    del far
-    loop = asyncio.get_running_loop()
-    assert isinstance(loop, VirtualClockLoop)
-    loop.jump(trouble.arguments["stall_s"])
-
-
-def _nothing(_: Random) -> Arguments:
-    return {}
-
-
-def _one_of(**choices: tuple[Any, ...]) -> Callable[[Random], Arguments]:
-    return lambda random: {name: random.choice(values) for name, values in choices.items()}
-
-
 _SOON_S: Final = (0.0, 0.0, 0.0007, 0.0013, 0.0031, 0.011, 0.04, 0.3)
 
 TROUBLES: Final[Mapping[str, TroubleKind]] = {
-    "tamper": TroubleKind(7, _draw_tamper, _tamper),
-    "slow line": TroubleKind(2, _one_of(direction=("to_drive", "to_host"), delay_s=_DELAYS_S), _slow_line),
-    "hold": TroubleKind(1, _nothing, _hold),
-    "cut": TroubleKind(1, _nothing, _cut, reconnecting=4),
-    "half open": TroubleKind(1, _one_of(is_cut=(False, True)), _half_open, reconnecting=1),
+    "tamper": TroubleKind(7, _draw_tamper, tamper),
+    "slow line": TroubleKind(2, one_of(direction=("to_drive", "to_host"), delay_s=_DELAYS_S), slow_line),
+    "hold": TroubleKind(1, nothing, hold),
+    "cut": TroubleKind(1, nothing, cut, reconnecting=4),
+    "half open": TroubleKind(1, one_of(is_cut=(False, True)), half_open, reconnecting=1),
     "blackout": TroubleKind(
-        0, _one_of(later_s=(0.0, 0.05, 0.3), off_s=(0.0, 0.05, 0.3, 4.0)), _blackout, reconnecting=1.5
+        0, one_of(later_s=(0.0, 0.05, 0.3), off_s=(0.0, 0.05, 0.3, 4.0)), _blackout, reconnecting=1.5
     ),
-    "noise": TroubleKind(2, _one_of(data=_NOISE), _noise),
-    "flood": TroubleKind(0.2, _one_of(pieces=(3, 20, 200), data=(b"\x55", b"1", b"\r\n", b"A")), _flood),
-    "other host": TroubleKind(0.7, _one_of(data=(b"\n", b"\nA", b"R5", b"\nQ", b"1")), _other_host),
-    "lose echo": TroubleKind(4, _one_of(count=(1, 1, 1, 2, 5), after_s=_SOON_S), _lose_echo, of_axis=True),
-    "garble echo": TroubleKind(2, _one_of(count=(1, 1, 2), after_s=_SOON_S), _garble_echo, of_axis=True),
-    "lose character": TroubleKind(3, _one_of(count=(1, 1, 1, 2, 4), after_s=_SOON_S), _lose_character),
-    "flip character": TroubleKind(3, _one_of(bit=tuple(range(8)), after_s=_SOON_S), _flip_character),
-    "late answer": TroubleKind(2, _one_of(delay_s=_DELAYS_S), _late_answer, of_axis=True),
-    "stick": TroubleKind(2, _nothing, _stick),
-    "reset": TroubleKind(4, _one_of(after_s=_SOON_S), _reset, of_axis=True),
-    "jog": TroubleKind(1.5, _one_of(after_s=_SOON_S, distance=(30.0, -700.0)), _jog, of_axis=True),
-    "power": TroubleKind(1, _nothing, _power),
-    "stall": TroubleKind(1, _one_of(stall_s=(0.01, 0.15, 0.5, 2.5)), _stall),
+    "noise": TroubleKind(2, one_of(data=_NOISE), _noise),
+    "flood": TroubleKind(0.2, one_of(pieces=(3, 20, 200), data=(b"\x55", b"1", b"\r\n", b"A")), _flood),
+    "other host": TroubleKind(0.7, one_of(data=(b"\n", b"\nA", b"R5", b"\nQ", b"1")), other_host),
+    "lose echo": TroubleKind(4, one_of(count=(1, 1, 1, 2, 5), after_s=_SOON_S), _lose_echo, of_axis=True),
+    "garble echo": TroubleKind(2, one_of(count=(1, 1, 2), after_s=_SOON_S), _garble_echo, of_axis=True),
+    "lose character": TroubleKind(3, one_of(count=(1, 1, 1, 2, 4), after_s=_SOON_S), _lose_character),
+    "flip character": TroubleKind(3, one_of(bit=tuple(range(8)), after_s=_SOON_S), _flip_character),
+    "late answer": TroubleKind(2, one_of(delay_s=_DELAYS_S), _late_answer, of_axis=True),
+    "stick": TroubleKind(2, nothing, _stick),
+    "reset": TroubleKind(4, one_of(after_s=_SOON_S), _reset, of_axis=True),
+    "jog": TroubleKind(1.5, one_of(after_s=_SOON_S, distance=(30.0, -700.0)), _jog, of_axis=True),
+    "power": TroubleKind(1, nothing, _power),
+    "stall": TroubleKind(1, one_of(stall_s=(0.01, 0.15, 0.5, 2.5)), stall),
 }
 """By name."""
