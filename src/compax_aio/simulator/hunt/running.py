@@ -12,7 +12,9 @@ from typing import Any, Final, Protocol, TypeVar
 from compax_aio.errors import CompaxError
 from compax_aio.simulator.clock import VirtualClockLoop
 
-__all__ = ["LONGEST_S", "all_ended", "in_time", "let_go_of_tasks", "run", "told"]
+from .scenario import Action
+
+__all__ = ["LONGEST_S", "all_ended", "carried_out", "in_time", "let_go_of_tasks", "run", "told"]
 
 LONGEST_S: Final = 3600.0
 """Of virtual time: what has not ended then never will."""
@@ -75,6 +77,20 @@ async def in_time(
             loop.call_at(item.at_s, now_is_the_time.set_result, None)
             await now_is_the_time
         tasks.append(asyncio.ensure_future(begin(item)))
+
+
+async def carried_out(action: Action, work: Awaitable[None], complaints: list[str]) -> None:
+    """Let a user do something, and perhaps give it up; what goes wrong with that is complained of."""
+    task = asyncio.ensure_future(work)
+    if action.gives_up is not None:
+        after_s, steps = action.gives_up
+        await asyncio.wait([task], timeout=after_s)
+        for _ in range(steps):
+            await asyncio.sleep(0)
+        task.cancel()
+    await asyncio.wait([task])
+    if not task.cancelled() and (error := task.exception()) is not None:
+        complaints.append(f"item {action.number}: {error!r}")
 
 
 async def all_ended(tasks: list[asyncio.Task[None]], complaints: list[str], complaint: str) -> None:

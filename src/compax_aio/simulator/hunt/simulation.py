@@ -11,7 +11,7 @@ from compax_aio.simulator.compax.log import MAX_ENTRIES
 from compax_aio.simulator.line import DeviceLine
 
 from .actions import ACTIONS
-from .running import all_ended, in_time, let_go_of_tasks, run, told
+from .running import all_ended, carried_out, in_time, let_go_of_tasks, run, told
 from .scenario import Action, DrivePlan, Scenario, Trouble
 from .stage import Stage
 from .testimony import Seen, SeenAxis, longest_opening_s
@@ -115,16 +115,7 @@ async def _act(stage: Stage, action: Action, opening: dict[str, asyncio.Task[Non
     await asyncio.wait([opening[axis] for axis in action.axes])
     if not all(axis in stage.drives for axis in action.axes):
         return
-    task = asyncio.ensure_future(ACTIONS[action.kind].do(stage, action))
-    if action.gives_up is not None:
-        after_s, steps = action.gives_up
-        await asyncio.wait([task], timeout=after_s)
-        for _ in range(steps):
-            await asyncio.sleep(0)
-        task.cancel()
-    await asyncio.wait([task])
-    if not task.cancelled() and (error := task.exception()) is not None:
-        stage.testimony.complaints.append(f"item {action.number}: {error!r}")
+    await carried_out(action, ACTIONS[action.kind].do(stage, action), stage.testimony.complaints)
 
 
 def _weigh(stage: Stage, axis: str) -> None:

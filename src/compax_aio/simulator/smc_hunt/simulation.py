@@ -9,7 +9,7 @@ from compax_aio.simulator.smc.line import SimulatedPartyLine
 from compax_aio.smc.connecting import connect
 from compax_aio.smc.party_line import PartyLine
 
-from ..hunt.running import all_ended, in_time, let_go_of_tasks, run, told
+from ..hunt.running import all_ended, carried_out, in_time, let_go_of_tasks, run, told
 from ..hunt.scenario import Action, Trouble
 from ..hunt.troubled_line import TroubledLine
 from ..hunt.weighing import weigh
@@ -112,16 +112,7 @@ async def _act(stage: PartyStage, action: Action, opening: asyncio.Task[None]) -
     await asyncio.wait([opening])
     if stage.line is None:
         return
-    task = asyncio.ensure_future(ACTIONS[action.kind].do(stage, action))
-    if action.gives_up is not None:
-        after_s, steps = action.gives_up
-        await asyncio.wait([task], timeout=after_s)
-        for _ in range(steps):
-            await asyncio.sleep(0)
-        task.cancel()
-    await asyncio.wait([task])
-    if not task.cancelled() and (error := task.exception()) is not None:
-        stage.testimony.complaints.append(f"item {action.number}: {error!r}")
+    await carried_out(action, ACTIONS[action.kind].do(stage, action), stage.testimony.complaints)
 
 
 def _heal(line: TroubledLine, far: SimulatedPartyLine) -> None:
