@@ -7,8 +7,9 @@ import asyncio
 import pytest
 from tests.smc.bench import bench, motions, outcome, until
 
-from compax_aio.errors import CompaxError, MoveError, MoveStoppedError
+from compax_aio.errors import CompaxError, MoveError, MoveStoppedError, UnexpectedAnswerError
 from compax_aio.simulator.smc import LogKind
+from compax_aio.smc.events import AxesReset
 
 pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
@@ -53,3 +54,47 @@ async def test_a_move_that_a_reset_has_ended_at_its_target_is_not_told_as_arrive
         await line.reset()
         assert isinstance(await outcome(move), MoveStoppedError)
         assert far.axes["A"].position == 2000
+
+
+async def test_the_first_reason_of_a_lost_reference_is_kept() -> None:
+    async with bench(axes="A") as (line, _, _):
+        axis = line.axis("A")
+        axis.note_reset("first")
+        axis.note_reset("second")
+        assert axis.lost_reference == "first"
+
+
+async def test_an_origin_that_is_not_taken_leaves_no_reference() -> None:
+    async with bench(axes="A") as (line, far, cable):
+        axis = line.axis("A")
+        cable.at("AO0\n", lambda: far.axes["A"].jog(20_000))
+        with pytest.raises(UnexpectedAnswerError, match="was told to count from here"):
+            await axis.set_origin()
+        assert axis.lost_reference is not None
+
+
+async def test_a_raw_motion_is_not_sent_again_to_an_axis_that_was_reset_in_between() -> None:
+    async with bench(axes="A", position=4000) as (line, far, cable):
+        axis = line.axis("A")
+        await axis.position()
+        cable.at("AZ\n", lambda: cable.at("A", far.axes["A"].reset))
+        with pytest.raises(MoveError, match="'R300' was not sent"):
+            await axis.raw("R300")
+        assert motions(far) == []
+
+
+@pytest.mark.parametrize("mode", ["single", "daisy"])
+async def test_a_reset_from_here_is_told_once(mode: str) -> None:
+    async with bench(mode=mode) as (line, _, _):
+        events = line.events()
+        await line.reset()
+        await line.close()
+        told = [event.reason async for event in events if isinstance(event, AxesReset)]
+        assert told == ["^C was sent"]
+
+
+async def test_a_stop_looks_twice_before_it_says_that_the_axis_stands() -> None:
+    async with bench(axes="A") as (line, far, _):
+        before = far.log.texts(LogKind.COMMAND, axis="A").count("^")
+        await line.axis("A").stop()
+        assert far.log.texts(LogKind.COMMAND, axis="A").count("^") - before == 2
