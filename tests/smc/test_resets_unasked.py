@@ -98,3 +98,14 @@ async def test_a_stop_looks_twice_before_it_says_that_the_axis_stands() -> None:
         before = far.log.texts(LogKind.COMMAND, axis="A").count("^")
         await line.axis("A").stop()
         assert far.log.texts(LogKind.COMMAND, axis="A").count("^") - before == 2
+
+
+async def test_a_second_reset_keeps_a_raw_motion_back_as_the_first_did() -> None:
+    async with bench(axes="A", position=4000) as (line, far, cable):
+        axis = line.axis("A")
+        axis.note_reset("an earlier one")
+        await axis.position()
+        cable.at("AZ\n", lambda: cable.at("A", far.axes["A"].reset))
+        with pytest.raises(MoveError, match="'R300' was not sent"):
+            await axis.raw("R300")
+        assert motions(far) == []

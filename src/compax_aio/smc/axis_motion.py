@@ -149,14 +149,14 @@ class AxisMotion(OneMove[Pursuit, Look, str]):
             on_sent()
 
         line, axis = self._observer.line, self._observer.axis
-        before, known_loss = self._observer.standing_at, self._observer.lost_reference
+        before, times_lost = self._observer.standing_at, self._observer.times_lost
         outcome = await line.start(axis, text, lane, written)
         if isinstance(outcome, EntryFailed) and not outcome.was_begun:
             # It may have kept silent because it was reset, and count from elsewhere now.
             if before is not None:
                 self._observer.note_standing(before)
             await self.refuse_if_moving(repr(text))
-            if (why := self._observer.lost_reference) is not None and why != known_loss:
+            if (why := self._observer.lost_reference) is not None and self._observer.times_lost != times_lost:
                 raise self._axis_reports.no_reference(repr(text), why)
             outcome = await line.start(axis, text, lane, written)
         is_known = text[0] in COMMANDS
