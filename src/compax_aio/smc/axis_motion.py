@@ -249,7 +249,7 @@ class AxisMotion(OneMove[Pursuit, Look, str]):
         """Let no motion that waits for its turn be sent."""
         self.untracked.take_back()
         if self._active is not None and not self._active.move.is_on_wire:
-            self._withdraw(self._active.move, self.cut_off(why))
+            self._withdraw(self._active.move, self._axis_reports.no_reference(self._active.move.description, why))
 
     @property
     def is_watched(self) -> bool:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 from ..errors import CompaxError, MoveActiveError, MoveError, MoveStoppedError, MoveTimeoutError
 from ..motion.reports import MoveReports
 from .moves import AxisMove
 from .observer import Look, Observer
 
 __all__ = ["AxisReports"]
+
+_Error = TypeVar("_Error", bound=MoveError)
 
 
 class AxisReports(MoveReports):
@@ -78,56 +82,43 @@ class AxisReports(MoveReports):
 
     def stopped(self, move: AxisMove, look: Look) -> MoveStoppedError:
         """Report a move that was stopped from here."""
-        return MoveStoppedError(
-            f"{move.description} was stopped at {self._observer.written(look.position)}",
-            device=self._name,
-            sent=move.sent,
-            received=look.as_sent,
-            hint=self._doubtful_count() or "command a new move when you want to go on",
-        )
+        what = f"{move.description} was stopped at {self._observer.written(look.position)}"
+        hint = self._doubtful_count() or "command a new move when you want to go on"
+        return self._seen(MoveStoppedError, what, move, look, hint)
 
     def ended_elsewhere(self, move: AxisMove, look: Look) -> MoveStoppedError:
         """Report a move after which the axis stands, but not where it should."""
-        at = self._observer.written(look.position)
-        return MoveStoppedError(
-            f"{move.description} ended at {at}, and nobody here has stopped it",
-            device=self._name,
-            sent=move.sent,
-            received=look.as_sent,
-            hint=self._doubtful_count() or "a limit, another host, or abort_all() may have stopped it: read limits()",
-        )
+        what = f"{move.description} ended at {self._observer.written(look.position)}, and nobody here has stopped it"
+        hint = self._doubtful_count() or "a limit, another host, or abort_all() may have stopped it: read limits()"
+        return self._seen(MoveStoppedError, what, move, look, hint)
 
     def no_home(self, move: AxisMove, look: Look) -> MoveStoppedError:
         """Report a search for home after which the home input is not active."""
-        return MoveStoppedError(
-            f"{move.description} ended at {self._observer.written(look.position)}, and the home input is not active",
-            device=self._name,
-            sent=move.sent,
-            received=look.as_sent,
-            hint="which bit it is, and what its level means, are in the profile (home_query, home_bit)",
-        )
+        what = f"{move.description} ended at {self._observer.written(look.position)}, and the home input is not active"
+        hint = "which bit it is, and what its level means, are in the profile (home_query, home_bit)"
+        return self._seen(MoveStoppedError, what, move, look, hint)
 
     def not_settled(self, move: AxisMove, look: Look, seconds: float) -> MoveTimeoutError:
         """Report an axis that stands, and goes on saying that it homes, hunts or ramps."""
-        return MoveTimeoutError(
+        what = (
             f"{move.description}: for {seconds:g} s the axis has stood at {self._observer.written(look.position)} "
-            "without settling, and was stopped",
-            device=self._name,
-            sent=move.sent,
-            received=look.as_sent,
-            hint="is it an encoder that cannot reach its dead band? A longer standstill_timeout_s waits longer",
+            "without settling, and was stopped"
         )
+        hint = "is it an encoder that cannot reach its dead band? A longer standstill_timeout_s waits longer"
+        return self._seen(MoveTimeoutError, what, move, look, hint)
 
     def stalled(self, move: AxisMove, look: Look, seconds: float) -> MoveTimeoutError:
         """Report an axis that says it moves, and is always at the same position."""
-        return MoveTimeoutError(
+        what = (
             f"{move.description}: for {seconds:g} s the axis has said that it moves, and that it is at "
-            f"{self._observer.written(look.position)}; it was stopped",
-            device=self._name,
-            sent=move.sent,
-            received=look.as_sent,
-            hint="find out what holds it; a longer stall_timeout_s waits longer",
+            f"{self._observer.written(look.position)}; it was stopped"
         )
+        hint = "find out what holds it; a longer stall_timeout_s waits longer"
+        return self._seen(MoveTimeoutError, what, move, look, hint)
+
+    def _seen(self, kind: type[_Error], what: str, move: AxisMove, look: Look, hint: str) -> _Error:
+        """Report what a look has shown of a move."""
+        return kind(what, device=self._name, sent=move.sent, received=look.as_sent, hint=hint)
 
     def _doubtful_count(self) -> str | None:
         why = self._observer.lost_reference
