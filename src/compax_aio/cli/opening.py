@@ -1,0 +1,52 @@
+"""The line that a command works on: its URL, and the options that all commands with a line have."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import AsyncExitStack, asynccontextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+import compax_aio
+from compax_aio import Drive, DriveSettings
+
+__all__ = ["DriveLine", "Url"]
+
+Url = Annotated[
+    str,
+    Parameter(
+        help="Line of the drive: serial:///dev/ttyUSB0?baudrate=9600, tcp://192.168.1.50:4001, sim://compax …",
+    ),
+]
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class DriveLine:
+    """How a drive is talked to."""
+
+    name: str | None = None
+    """What the drive is called in messages; its URL if not given."""
+    settings: Annotated[Path | None, Parameter(env_var="COMPAX_SETTINGS")] = None
+    """TOML file with the settings of the drive, as `compax probe` writes it."""
+    trace: Path | None = None
+    """Record all that goes over the line to this file, for `compax replay` and `compax trace check`."""
+
+    @asynccontextmanager
+    async def open(self, url: str) -> AsyncIterator[Drive]:
+        """Connect to the drive; leaving the block stops what was started and closes the line."""
+        async with AsyncExitStack() as stack:
+            if self.trace is not None:
+                from compax_aio.recording import record_trace  # noqa: PLC0415 - few need it
+
+                await stack.enter_async_context(record_trace(self.trace))
+            yield await stack.enter_async_context(
+                compax_aio.connect(url, name=self.name, settings=self.drive_settings())
+            )
+
+    def drive_settings(self) -> DriveSettings:
+        """Return the settings of the file, or the defaults without one."""
+        return DriveSettings() if self.settings is None else DriveSettings.load(self.settings)

@@ -1,0 +1,91 @@
+"""What a command prints: for people, or with ``--json`` one document for programs; errors on the other stream."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import sys
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+from rich.console import Console, RenderableType
+from rich.text import Text
+
+from ..errors import CompaxError
+from .exit_codes import exit_code_of
+
+__all__ = ["Printing", "as_json", "notes_console", "tell_error"]
+
+
+def as_json(value: Any) -> Any:
+    """Return *value* as JSON has it: dataclasses and mappings as objects, members by name, errors with all they say."""
+    if isinstance(value, Enum):
+        return value.name
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    if isinstance(value, BaseException):
+        return _error_document(value)
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {each.name: as_json(getattr(value, each.name)) for each in dataclasses.fields(value)}
+    if isinstance(value, Mapping):
+        return {str(key): as_json(each) for key, each in value.items()}
+    if isinstance(value, Iterable) and not isinstance(value, bytes):
+        return [as_json(each) for each in value]
+    return str(value)
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Printing:
+    """How results are printed."""
+
+    json: Annotated[bool, Parameter(negative=())] = False
+    """Print data as JSON, for programs."""
+
+    def show(self, data: Any, people: RenderableType | None = None) -> None:
+        """Print *data* as one line of JSON, or what *people* read in its place."""
+        if self.json:
+            print(json.dumps(as_json(data), ensure_ascii=False), flush=True)  # noqa: T201
+        elif people is not None:
+            Console(highlight=False, soft_wrap=isinstance(people, str | Text)).print(people, markup=False)
+
+    def note(self, text: str) -> None:
+        """Tell a person what is going on, beside the results; programs are spared it."""
+        if not self.json:
+            notes_console().print(text, markup=False)
+
+
+def notes_console() -> Console:
+    """Return the console for what is no result: progress, notes and errors."""
+    return Console(file=sys.stderr, highlight=False, soft_wrap=True)
+
+
+def tell_error(error: BaseException, *, as_document: bool) -> None:
+    """Say *error* on the error stream, as a person or a program reads it; never with a traceback."""
+    if as_document:
+        print(json.dumps({"error": _error_document(error)}, ensure_ascii=False), file=sys.stderr)  # noqa: T201
+        return
+    kind = "" if isinstance(error, OSError) else f"{type(error).__name__}: "
+    console = notes_console()
+    console.print(Text.assemble((kind, "bold red"), str(error) or type(error).__name__))
+    for note in getattr(error, "__notes__", ()):
+        console.print(Text(note))
+    if isinstance(error, CompaxError) and error.exchanges:
+        console.print(Text("the last that went over the line:", style="dim"))
+        for line in error.exchanges[-6:]:
+            console.print(Text(f"  {line}", style="dim"))
+
+
+def _error_document(error: BaseException) -> dict[str, Any]:
+    told: dict[str, Any] = {"kind": type(error).__name__, "text": str(error), "exit_code": exit_code_of(error)}
+    if isinstance(error, CompaxError):
+        for name in ("what", "device", "sent", "received", "hint", "code", "exchanges"):
+            told[name] = as_json(getattr(error, name))
+    if isinstance(error, OSError) and error.filename is not None:
+        told["file"] = str(Path(error.filename))
+    told["notes"] = list(getattr(error, "__notes__", ()))
+    return told
