@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
+from types import NoneType
 from typing import Annotated, Any
 
 from cyclopts import Parameter
@@ -25,17 +26,15 @@ def as_json(value: Any) -> Any:
     """Return *value* as JSON has it: dataclasses and mappings as objects, members by name, errors with all they say."""
     if isinstance(value, Enum):
         return value.name
-    if value is None or isinstance(value, bool | int | float | str):
-        return value
     if isinstance(value, BaseException):
         return _error_document(value)
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return {each.name: as_json(getattr(value, each.name)) for each in dataclasses.fields(value)}
     if isinstance(value, Mapping):
         return {str(key): as_json(each) for key, each in value.items()}
-    if isinstance(value, Iterable) and not isinstance(value, bytes):
+    if isinstance(value, Iterable) and not isinstance(value, str | bytes):
         return [as_json(each) for each in value]
-    return str(value)
+    return value if isinstance(value, bool | int | float | NoneType) else str(value)
 
 
 @Parameter(name="*")

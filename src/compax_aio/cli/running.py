@@ -33,8 +33,13 @@ def run_words(app: App, words: Sequence[str]) -> int:
     except SystemExit as end:
         return end.code if isinstance(end.code, int) else OK
     as_document = any(isinstance(each, Printing) and each.json for each in bound.arguments.values())
+    return _told(lambda: _carry_out(command, *bound.args, **bound.kwargs), as_document=as_document)
+
+
+def _told(carry_out: Callable[[], int], *, as_document: bool) -> int:
+    """Return what *carry_out* returns, or the exit code of the error that it raises, once that is told."""
     try:
-        return _carry_out(command, *bound.args, **bound.kwargs)
+        return carry_out()
     except KeyboardInterrupt:
         if not as_document:
             notes_console().print("Interrupted. What this command had set in motion was stopped, and it stands.")
