@@ -3,7 +3,9 @@ Every Python block of README and documents runs, and what stands under it as its
 
 The blocks of a page are one program: they share names and an event loop on a virtual clock, and may await. A fence
 marked ``output`` right after a block holds all that the block prints, from the beginning of a line to its end; ``...``
-stands for anything on one line.
+stands for anything on one line. A fence marked ``console`` is a session: its ``$ compax`` lines are carried out one
+after the other, and print what stands under them, a line ``...`` standing for any number of lines. In ``sh`` fences,
+commands of ``compax`` are ones that it understands.
 """
 
 from __future__ import annotations
@@ -11,7 +13,9 @@ from __future__ import annotations
 import ast
 import asyncio
 import inspect
+import itertools
 import re
+import shlex
 import textwrap
 from collections.abc import Callable, Coroutine, Iterator
 from dataclasses import dataclass
@@ -19,12 +23,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from cyclopts import CycloptsError
 
+from compax_aio.cli.app import app
+from compax_aio.cli.app import run as run_command
 from compax_aio.simulator.clock import VirtualClockLoop
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]
-LANGUAGES = {"python", "output", "text", "toml", "sh", "ini", "{eval-rst}", "{toctree}"}
+LANGUAGES = {"python", "output", "text", "toml", "sh", "console", "ini", "{eval-rst}", "{toctree}"}
 
 _FENCE = re.compile(r"^(?P<indent> *)```(?P<language>\S*)[^\n]*\n(?P<text>.*?)^ *```\s*$", re.MULTILINE | re.DOTALL)
 
@@ -106,7 +113,83 @@ def test_every_block_says_what_it_is(page: Path) -> None:
 
 
 def _is_known(language: str) -> bool:
-    return language in LANGUAGES or language.startswith("{table-of-")
+    return language in LANGUAGES or language.startswith("{table-of-") or language.endswith("state-diagram}")
+
+
+# Sessions at the terminal
+
+
+def commands_in(text: str, prompt: str) -> Iterator[list[str]]:
+    """Give the words of each command of ``compax``, as far as the next sign that means something to a shell."""
+    for line in text.replace("\\\n", " ").splitlines():
+        if not line.startswith(f"{prompt}compax "):
+            continue
+        lexer = shlex.shlex(line.removeprefix(prompt), posix=True, punctuation_chars="|<>&;()")
+        lexer.whitespace_split = True
+        lexer.commenters = "#"
+        words = list(itertools.takewhile(lambda word: not set(word) <= set("|<>&;()"), lexer))
+        yield words[1:]
+
+
+def understood(words: list[str]) -> str:
+    """Say what ``compax`` does not understand of *words*; nothing if it does."""
+    try:
+        app.parse_args(words, exit_on_error=False, print_error=False, help_on_error=False)
+    except CycloptsError as error:
+        return str(error)
+    return ""
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_every_command_of_a_page_is_one_that_compax_understands(page: Path, tmp_path: Path, monkeypatch: Any) -> None:
+    monkeypatch.chdir(tmp_path)
+    wrong = [
+        f"{name_of(page)}:{line}: compax {shlex.join(words)}: {problem}"
+        for language, text, line, _ in fences_of(page)
+        if language in {"sh", "console"}
+        for words in commands_in(text, "$ " if language == "console" else "")
+        if not {"--help", "--version"} & set(words) and (problem := understood(words))
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+def sessions_of(page: Path) -> Iterator[tuple[int, str, str]]:
+    """Give line number, command and what it prints, of every command in a session."""
+    for language, text, line, _ in fences_of(page):
+        if language == "console":
+            for number, part in enumerate(re.split(r"^\$ ", text, flags=re.MULTILINE)[1:]):
+                command, _, printed = part.partition("\n")
+                while command.endswith("\\"):
+                    rest, _, printed = printed.partition("\n")
+                    command = command[:-1] + rest
+                yield line + number, command, printed
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if any(sessions_of(page))], ids=name_of)
+def test_a_session_of_a_page_prints_what_the_page_says(
+    page: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "100")
+    with asyncio.Runner(loop_factory=VirtualClockLoop) as runner:
+        monkeypatch.setattr(asyncio, "run", runner.run)
+        for line, command, expected in sessions_of(page):
+            for words in commands_in(f"$ {command}", "$ "):
+                run_command(words)
+                told = capfd.readouterr()
+                printed = "\n".join(each.rstrip() for each in (told.err + told.out).splitlines())
+                if not matches_session(expected, printed):
+                    assert printed == expected, f"{name_of(page)}:{line}: it prints something else"
+
+
+def matches_session(expected: str, printed: str) -> bool:
+    pattern = "".join(
+        r"(?:[^\n]*\n)*?"
+        if line.strip() == "..."
+        else "[^\n]*".join(map(re.escape, line.rstrip().split("..."))) + r"\n"
+        for line in expected.strip("\n").splitlines()
+    )
+    return re.fullmatch(pattern, printed.strip("\n") + "\n") is not None
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
