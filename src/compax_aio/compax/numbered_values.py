@@ -14,16 +14,12 @@ from ..checked_numbers import check_number
 from ..errors import (
     CommandRejectedError,
     CompaxError,
-    InvalidCommandError,
     RestoreIncompleteError,
     UnexpectedAnswerError,
 )
-from ..escaping import shown
 from .codecs import decode_number
-from .facts.parameters import MAX_DIGITS
 from .half_done import HalfDone, RollBack
 from .line import DriveLine
-from .plain_line import as_index, check_line
 from .value_file import read_file, write_file
 from .value_tables import ValueTable
 
@@ -98,7 +94,7 @@ class NumberedValues:
         return await self._write(number, value)
 
     async def _write(self, number: int, value: float, on_sent: Callable[[], None] | None = None) -> float:
-        number = self._index(number)
+        number = self._table.index(number)
         value = check_number(self._name(number), value)
         text = self._written(number, value)
 
@@ -115,7 +111,7 @@ class NumberedValues:
                 error.hint = f"write it inside parameters.unlocked() if it is protected; else {error.hint}"
             raise
         read_back = await self.read(number)
-        if read_back != self._rounded(number, value):
+        if read_back != self._table.rounded(number, value):
             raise UnexpectedAnswerError(
                 f"{self._name(number)} was written as {value:g} and reads back as {read_back:g}",
                 device=self._line.name,
@@ -200,13 +196,29 @@ class NumberedValues:
             RestoreIncompleteError: A value was refused, was not read back as written, or its fate is unknown; says
                 which were applied, which not, and which is uncertain. :meth:`roll_back` takes them back.
         """
-        values = await self._load(path)
-        changes = self._changes(await self._compare(values))
+        return await self.write_several(await self._load(path), dry_run=dry_run, on_progress=on_progress)
+
+    async def write_several(
+        self, values: Mapping[int, float], *, dry_run: bool = False, on_progress: Progress | None = None
+    ) -> Restored:
+        """
+        Write those of *values* that the drive does not have yet, as :meth:`restore` does, with what it raises.
+
+        Args:
+            values: By number.
+            dry_run: Only say what would be written.
+            on_progress: Called after each value that was written.
+        """
+        values = {self._table.index(number): value for number, value in values.items()}
+        for number, value in values.items():
+            self._written(number, value)
+        wanted = {number: self._table.rounded(number, values[number]) for number in sorted(values)}
+        changes = self._changes(await self._compare(wanted))
         if not dry_run:
             await self._write_all(changes, on_progress)
         return Restored(
             changed=changes,
-            unchanged=len(values) - len(changes),
+            unchanged=len(wanted) - len(changes),
             was_dry_run=dry_run,
             pending=self._waiting(changes),
         )
@@ -306,28 +318,7 @@ class NumberedValues:
         return f"{fact.meaning} [{unit}]" if unit else fact.meaning
 
     def _name(self, number: int) -> str:
-        return f"{self._table.letter}{self._index(number)}"
-
-    def _index(self, number: int) -> int:
-        index = as_index(number)
-        if index is None or index not in self._table.decimals:
-            raise InvalidCommandError(
-                f"there is no {self._table.letter}{shown(number)} among the {self._table.kind} of a COMPAX",
-                hint="there are P1 to P250, V1 to V39 and V50 to V70 (IBS p. 12, 24, UG p. 104)",
-            )
-        return index
-
-    def _rounded(self, number: int, value: float) -> float:
-        return round(check_number(self._name(number), value), self._table.decimals[number]) + 0.0
+        return self._table.name(number)
 
     def _written(self, number: int, value: float) -> str:
-        rounded, decimals = self._rounded(number, value), self._table.decimals[number]
-        if abs(rounded - float(value)) > 1e-9 * max(1.0, abs(rounded)):
-            raise InvalidCommandError(f"{self._name(number)} has {decimals} decimals (IBS p. 24), not {shown(value)}")
-        if abs(rounded) >= 10**MAX_DIGITS:
-            raise InvalidCommandError(
-                f"{self._name(number)} cannot be {shown(value)}: a number has {MAX_DIGITS} digits before the point "
-                "(UG p. 158)"
-            )
-        template = self._line.settings.dialect.write_value
-        return check_line(template.format(name=self._name(number), value=f"{rounded:.{decimals}f}"))
+        return self._table.written(number, value, self._line.settings.dialect.write_value)

@@ -118,6 +118,15 @@ class ProgramRun:
         text, stops = check_line(word.format(n=record)), self._motion.stops
         await self._set_going(text, await self._look_before(text, goes_on=False), stops)
 
+    def let_go_on(self) -> None:
+        """
+        Let what was started here and is not watched go on, a program above all, when the block is left.
+
+        Nothing here stops it any more but a stop that somebody asks for. Does nothing for a move: that has
+        ``on_cancel="detach"``.
+        """
+        self._motion.untracked.note_over(self._motion.untracked.mark())
+
     async def stop(self) -> None:
         """
         Stop program and axis as :meth:`Drive.stop` does, ahead of everything; :meth:`start` continues them.
