@@ -27,6 +27,10 @@ class SimulatedDevice(Protocol):
     name: str
     served_by: Host | None
 
+    @property
+    def baudrate(self) -> int:
+        """Baud rate of its serial port; 0: bytes take no time, and any rate will do."""
+
     def receive(self, data: bytes, now: float) -> None:
         """Take bytes that arrive at *now*."""
 
@@ -65,6 +69,11 @@ class DeviceLine:
         if isinstance(line, DeviceLine) and line._loop is loop:  # noqa: SLF001  # of this class
             return line
         return cls(device, loop)
+
+    @property
+    def baudrate(self) -> int:
+        """Baud rate of the device; 0: any will do."""
+        return self._device.baudrate
 
     @property
     def occupied(self) -> bool:

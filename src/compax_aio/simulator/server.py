@@ -168,23 +168,29 @@ async def serve_tcp_group(
 
 
 @asynccontextmanager
-async def serve_pty(device: SimulatedDevice, *, state: _File | None = None) -> AsyncIterator[str]:
+async def serve_pty(
+    device: SimulatedDevice, *, state: _File | None = None, link: _File | None = None
+) -> AsyncIterator[str]:
     """
     Serve a device on a pseudo-terminal; gives its ``serial://`` URL. Linux and macOS.
 
+    A device with a baud rate hears and says garbage if a program sets the port to another one
+    (:class:`.PseudoTerminal`); then the URL names the right one.
+
     Args:
         device: What to serve.
+        link: A symbolic link to make to the terminal, for the URL; it is taken away when serving ends.
         state: File of what the device keeps without power: loaded first if it is there, saved when serving ends.
 
     Raises:
-        TransportError: Somebody else is connected to the device, or the file cannot be used.
+        TransportError: Somebody else is connected to the device, or the file or the link cannot be used.
     """
     from .pseudo_terminal import PseudoTerminal  # noqa: PLC0415  # there are none on Windows
 
-    terminal = PseudoTerminal(DeviceLine.of(device))
+    terminal = PseudoTerminal(DeviceLine.of(device), link)
     try:
         with _kept(device, state):
-            yield f"serial://{terminal.path}"
+            yield terminal.url
     finally:
         terminal.close()
 

@@ -86,6 +86,11 @@ class SimulatedPartyLine:
 
     # The line
 
+    @property
+    def baudrate(self) -> int:
+        """Baud rate of all axes, as the knob says; 0: bytes take no time, and any rate will do."""
+        return self.knobs.baudrate
+
     def receive(self, data: bytes, now: float) -> None:
         """Take bytes that the host begins to send at time *now*."""
         self.advance(now)
