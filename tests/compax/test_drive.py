@@ -39,6 +39,8 @@ from compax_aio.compax.events import (
     DriveEvent,
     EventStream,
     Fault,
+    MoveAccepted,
+    MoveEnded,
     PositionMessage,
     UnexpectedText,
 )
@@ -222,9 +224,11 @@ async def test_what_happens_is_told_to_all_who_follow_until_the_drive_is_closed(
         assert not any(follower.done() for follower in followers)
     first, *others = [await follower for follower in followers]
     assert all(other == first for other in others)
-    assert [type(event) for event in first] == [ComparatorPassed, PositionMessage, UnexpectedText, Fault]
-    assert all(event.drive == "press" and 0 < event.at < now() for event in first)
-    comparator, _, text, fault = first
+    assert [type(event) for event in first] == [
+        MoveAccepted, ComparatorPassed, PositionMessage, MoveEnded, UnexpectedText, MoveAccepted, Fault, MoveEnded
+    ]  # fmt: skip
+    assert all(event.drive == "press" and 0 < event.at <= now() for event in first)
+    _, comparator, _, _, text, _, fault, _ = first
     assert isinstance(comparator, ComparatorPassed)
     assert comparator.number == 1
     assert isinstance(text, UnexpectedText)

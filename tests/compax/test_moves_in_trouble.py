@@ -135,9 +135,9 @@ async def test_a_home_that_is_rejected_silently_is_not_reported_as_found() -> No
 
 async def test_a_fault_on_the_way_ends_the_move_with_its_code() -> None:
     async with bench() as (drive, far):
-        events = drive.events()
         move = drive.move_to(1000)
         await asyncio.sleep(1)
+        events = drive.events()
         far.raise_fault(55)
         error = await ending(move)
         assert isinstance(error, DriveFaultError)

@@ -22,6 +22,7 @@ from compax_aio.errors import (
 )
 from compax_aio.link.contract import Hold, Lane
 from compax_aio.link.link import Link
+from compax_aio.motion.events import DriveEvent
 from compax_aio.motion.moves import MoveFuture, OnCancel
 from compax_aio.motion.one_move import MustStop, OneMove
 from compax_aio.motion.reports import MoveReports
@@ -83,6 +84,7 @@ class Motion(OneMove[Pursuit, float, None]):
     def __init__(self) -> None:
         self.link = FakeLink()
         self.wire: list[str] = []
+        self.events: list[DriveEvent] = []
         self.pursuits: list[Pursuit] = []
         self.standstill: asyncio.Future[float] = asyncio.get_running_loop().create_future()
         self.readiness = asyncio.Event()
@@ -99,6 +101,7 @@ class Motion(OneMove[Pursuit, float, None]):
             untracked=Untracked(self._write, reports),
             memory=Memory(),
             log=logging.getLogger("compax_aio.toy"),
+            publish=self.events.append,
         )
 
     def move(

@@ -18,7 +18,7 @@ from compax_aio import (
     MoveStoppedError,
     UnexpectedAnswerError,
 )
-from compax_aio.compax.events import ConnectionLost, ConnectionRestored, DriveEvent
+from compax_aio.compax.events import ConnectionLost, ConnectionRestored, DriveEvent, MoveAccepted, MoveEnded
 from compax_aio.simulator.compax import SimulatedDrive
 
 from .bench import ending, lines, motions, now, until
@@ -311,7 +311,9 @@ async def test_a_limited_number_of_attempts_ends_all_that_waits() -> None:
         await cable.pull()
         assert isinstance(await ending(move), ConnectionLostError)
         assert isinstance(await ending(anext(watch)), ConnectionLostError)
-        assert [type(event) for event in await seen(events, 2)] == [ConnectionLost, ConnectionLost]
+        assert [type(event) for event in await seen(events, 4)] == [
+            MoveAccepted, ConnectionLost, ConnectionLost, MoveEnded
+        ]  # fmt: skip
         await cable.plug(far)
         await asyncio.sleep(60)
         assert not drive.is_open

@@ -308,8 +308,8 @@ async def test_what_overtakes_a_reset_does_not_undo_it(mode: str, gap_s: float, 
 
 async def test_an_axis_that_resets_itself_alone_is_noticed() -> None:
     async with bench(mode="single") as (line, far, _):
-        events = line.events()
         await line.axis().move_to(300)
+        events = line.events()
         far.axes["A"].reset()
         await asyncio.sleep(0.5)
         await outcome(line.axis().position())
@@ -439,8 +439,9 @@ async def test_a_name_that_did_not_arrive_is_not_stored() -> None:
 
 async def test_a_line_that_was_lost_comes_back_and_says_so() -> None:
     async with bench(axes="AB") as (line, far, cable):
-        events = line.events()
         await line.axis("A").move_to(100)
+        await asyncio.sleep(0.01)  # its end is told
+        events = line.events()
         cable.pull_and_plug(0.5)
         assert await line.axis("A").position() == 100, "a question waits for the line"
         assert isinstance(await anext(events), ConnectionLost)

@@ -82,7 +82,7 @@ class Drive(Readings, AxisCommands):
             on_restored=self._on_restored,
         )
         super().__init__(line, Observer(line, self._on_fault))
-        self._motion = Motion(self._observer)
+        self._motion = Motion(self._observer, self._events.publish)
         self._identity = Identity(self._observer, self._motion)
         self.parameters = Parameters(line)
         self.variables = NumberedValues(line, VARIABLE_TABLE)

@@ -4,7 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..motion.events import ConnectionLost, ConnectionRestored, DriveEvent, EventHub, EventStream, UnexpectedText
+from ..motion.events import (
+    ConnectionLost,
+    ConnectionRestored,
+    DriveEvent,
+    EventHub,
+    EventStream,
+    Mark,
+    MoveAccepted,
+    MoveEnded,
+    Stopped,
+    UnexpectedText,
+)
 from .facts.device_errors import DeviceError
 
 __all__ = [
@@ -15,7 +26,11 @@ __all__ = [
     "EventHub",
     "EventStream",
     "Fault",
+    "Mark",
+    "MoveAccepted",
+    "MoveEnded",
     "PositionMessage",
+    "Stopped",
     "UnexpectedText",
 ]
 
@@ -24,6 +39,10 @@ __all__ = [
 class PositionMessage(DriveEvent):
     """The drive sent ``$``: position reached (UG p. 160)."""
 
+    def as_mark(self) -> Mark:
+        """Say it in a few words."""
+        return Mark("$", None, "the drive says: position reached")
+
 
 @dataclass(frozen=True, slots=True)
 class ComparatorPassed(DriveEvent):
@@ -31,9 +50,19 @@ class ComparatorPassed(DriveEvent):
 
     number: int
 
+    def as_mark(self) -> Mark:
+        """Say it in a few words."""
+        return Mark("comparator", self.number)
+
 
 @dataclass(frozen=True, slots=True)
 class Fault(DriveEvent):
     """A status that was read shows a fault; *error* is None where the drive did not say which."""
 
     error: DeviceError | None
+
+    def as_mark(self) -> Mark:
+        """Say it in a few words."""
+        if self.error is None:
+            return Mark("fault", None, "the drive did not say which")
+        return Mark("fault", self.error.code, f"E{self.error.code}: {self.error.meaning}")

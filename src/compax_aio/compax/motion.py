@@ -11,6 +11,7 @@ from functools import partial
 
 from ..errors import CommandRejectedError, ConnectionLostError, MoveError, UnexpectedAnswerError
 from ..link.contract import Lane
+from ..motion.events import DriveEvent
 from ..motion.moves import check_manner
 from ..motion.one_move import OneMove
 from ..motion.untracked import Untracked
@@ -45,12 +46,13 @@ class Motion(OneMove[Pursuit, _Standstill, None]):
 
     Args:
         observer: Of the drive.
+        publish: Called with what happens to moves, and with standstills after stops.
     """
 
     _reports: Reports
     _memory: Memory
 
-    def __init__(self, observer: Observer) -> None:
+    def __init__(self, observer: Observer, publish: Callable[[DriveEvent], None]) -> None:
         self._observer = observer
         line = observer.line
         reports = Reports(line.name, observer)
@@ -61,6 +63,7 @@ class Motion(OneMove[Pursuit, _Standstill, None]):
             untracked=Untracked(line.command, reports),
             memory=Memory(),
             log=_log,
+            publish=publish,
         )
         self.restarts = 0
         """How many times the drive seemed to have been switched off and on while its line was lost."""

@@ -6,22 +6,110 @@ import asyncio
 from collections import deque
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Literal
 from weakref import WeakSet
 
-__all__ = ["ConnectionLost", "ConnectionRestored", "DriveEvent", "EventHub", "EventStream", "UnexpectedText"]
+from ..errors import CompaxError
+
+__all__ = [
+    "ConnectionLost",
+    "ConnectionRestored",
+    "DriveEvent",
+    "EventHub",
+    "EventStream",
+    "Mark",
+    "MoveAccepted",
+    "MoveEnded",
+    "MoveOutcome",
+    "Stopped",
+    "UnexpectedText",
+]
+
+MoveOutcome = Literal["reached", "stopped", "fault", "out of time", "in doubt", "refused", "cancelled", "failed"]
 
 _MAX_WAITING: Final = 1000
 
 
 @dataclass(frozen=True, slots=True)
+class Mark:
+    """An event in a few words, for records, plots and displays."""
+
+    word: str
+    """What happened: ``accepted``, ``fault``."""
+    value: float | None = None
+    """Its number, if it has one: a target, the number of a comparator, the code of an error."""
+    text: str = ""
+    """What a person wants to know beside that."""
+
+
+@dataclass(frozen=True, slots=True)
 class DriveEvent:
-    """Something that a drive or an axis, or its line, did unasked."""
+    """Something that a drive or an axis, or its line, did."""
 
     drive: str
     """The name of the drive or axis."""
     at: float
     """The event loop's time, in seconds, when it was read."""
+
+    def as_mark(self) -> Mark:
+        """Say it in a few words."""
+        return Mark(type(self).__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class MoveAccepted(DriveEvent):
+    """
+    A move of this end was taken by the device: *at* is when that was known.
+
+    It was acknowledged; or its acknowledgement was lost, and the device's status shows that it was taken.
+    """
+
+    move: str
+    """What was asked for, in a few words."""
+    target: float | None
+    """In the device's unit; None as long as only the device knows it."""
+
+    def as_mark(self) -> Mark:
+        """Say it in a few words."""
+        return Mark("accepted", self.target, self.move)
+
+
+@dataclass(frozen=True, slots=True)
+class MoveEnded(DriveEvent):
+    """
+    A move of this end is over for whoever awaits it; *outcome* says how.
+
+    Only ``reached`` says where the device is. After ``in doubt`` and ``failed`` it may be moving. After ``cancelled``
+    it is being stopped, if it had been told to move at all, and :class:`Stopped` follows; or it goes on
+    (``on_cancel="detach"``).
+    """
+
+    move: str
+    """What was asked for, in a few words."""
+    target: float | None
+    outcome: MoveOutcome
+    was_sent: bool
+    """Whether the line that starts the motion was written; if not, it never will be."""
+    confirmed_by: Literal["message", "status"] | None
+    """What has shown that the target was reached; None if it was not."""
+    error: CompaxError | None
+    """What awaiting the move raises; None if it was reached or cancelled."""
+
+    def as_mark(self) -> Mark:
+        """Say it in a few words."""
+        if self.outcome == "reached":
+            return Mark("reached", self.target, f"{self.move}, by {self.confirmed_by}")
+        why = self.move if self.error is None else self.error.what
+        return Mark(self.outcome, self.target, why if self.was_sent else f"{why} (nothing had been sent)")
+
+
+@dataclass(frozen=True, slots=True)
+class Stopped(DriveEvent):
+    """A stop from this end was acknowledged, and the device stands still; told also where no move was under way."""
+
+    def as_mark(self) -> Mark:
+        """Say it in a few words."""
+        return Mark("standstill", None, "stopped from here")
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +117,10 @@ class ConnectionLost(DriveEvent):
     """The line went away; it is tried again, unless the settings say otherwise (``reconnect``)."""
 
     reason: str
+
+    def as_mark(self) -> Mark:
+        """Say it in a few words."""
+        return Mark("connection lost", None, self.reason)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,12 +137,20 @@ class ConnectionRestored(DriveEvent):
     What it was told before, and what it counts its position from, may be gone then.
     """
 
+    def as_mark(self) -> Mark:
+        """Say it in a few words."""
+        return Mark("connection restored", self.lost_for_s, " and ".join(self.signs_of_restart))
+
 
 @dataclass(frozen=True, slots=True)
 class UnexpectedText(DriveEvent):
     """Something came that answers nothing: noise, a doubled answer, a text of another device."""
 
     text: str
+
+    def as_mark(self) -> Mark:
+        """Say it in a few words."""
+        return Mark("unexpected text", None, self.text)
 
 
 class EventStream(AsyncIterator[DriveEvent]):

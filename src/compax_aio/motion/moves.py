@@ -123,6 +123,7 @@ class MoveFuture(asyncio.Future[MoveResult]):
         on_cancel: What cancelling it does.
         sent: The line that started the motion, as it was written; None until then.
         started_at: Loop time when that was; None until then.
+        failure: The error that it has ended with; None if it has not. Looking at it is not having learnt of it.
         is_told_by_part: Whether somebody awaits a part of it, and so learns its error.
     """
 
@@ -136,6 +137,7 @@ class MoveFuture(asyncio.Future[MoveResult]):
         self.on_cancel = on_cancel
         self.sent: str | None = None
         self.started_at: float | None = None
+        self.failure: CompaxError | None = None
         self.is_told_by_part = False
         self._owner = owner
         self._changed = asyncio.Event()
@@ -228,6 +230,7 @@ class MoveFuture(asyncio.Future[MoveResult]):
             self.add_done_callback(fetch_error)
         self._acceptance.fail(error)
         if not self.done():
+            self.failure = error
             self.set_exception(error)
 
 

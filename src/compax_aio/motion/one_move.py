@@ -17,6 +17,8 @@ from ..errors import (
     UnexpectedAnswerError,
 )
 from ..link.link import Link
+from .announcing import announce
+from .events import DriveEvent, Stopped
 from .moves import MoveFuture, fetch_error
 from .reports import MoveReports
 from .untracked import Untracked
@@ -89,6 +91,7 @@ class OneMove(ABC, Generic[_Pursuit, _Standstill, _Answer]):
         untracked: Of the same drive or axis.
         memory: Of the same drive or axis.
         log: Where a stop that failed is told.
+        publish: Called with what happens to moves, and with standstills after stops.
     """
 
     def __init__(
@@ -100,6 +103,7 @@ class OneMove(ABC, Generic[_Pursuit, _Standstill, _Answer]):
         untracked: Untracked[_Answer],
         memory: Doubtful,
         log: logging.Logger,
+        publish: Callable[[DriveEvent], None],
     ) -> None:
         self.name = name
         self.untracked = untracked
@@ -109,6 +113,7 @@ class OneMove(ABC, Generic[_Pursuit, _Standstill, _Answer]):
         self._reports = reports
         self._memory = memory
         self._log = log
+        self._publish = publish
         self._loop = asyncio.get_running_loop()
         self._active: _Pursuit | None = None
         self._stopped: _Pursuit | None = None
@@ -166,6 +171,7 @@ class OneMove(ABC, Generic[_Pursuit, _Standstill, _Answer]):
         self._task = self._loop.create_task(self._pursue(pursuit), name=f"{self.name}: {move.description}")
         # Whatever ends the move, by whoever's hand: the drive is free for the next.
         move.add_done_callback(self._move_done)
+        announce(move, self.name, self._publish)
 
     def _limit(self, move: MoveFuture, timeout_s: float | None) -> None:
         """Let *move* take *timeout_s* from now on and no longer, if it is not None."""
@@ -319,6 +325,7 @@ class OneMove(ABC, Generic[_Pursuit, _Standstill, _Answer]):
             if pursuit is not None:
                 pursuit.move.fail(self._reports.in_doubt(pursuit.move, "it may still be moving, a stop failed", error))
             raise
+        self._publish(Stopped(self.name, self._loop.time()))
         if pursuit is not None:
             self._conclude_stopped(pursuit, standstill, reason)
 

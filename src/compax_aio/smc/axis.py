@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from ..errors import InvalidCommandError
 from ..link.contract import Lane
+from ..motion.events import DriveEvent
 from ..motion.moves import OnCancel
 from .axis_motion import AxisMotion
 from .axis_settings import SettingsOfAxis
@@ -47,12 +48,18 @@ class SmcAxis:
         program: The program in its memory.
     """
 
-    def __init__(self, line: SmcLine, name: str, on_lost_reference: Callable[[str, str], None]) -> None:
+    def __init__(
+        self,
+        line: SmcLine,
+        name: str,
+        on_lost_reference: Callable[[str, str], None],
+        publish: Callable[[DriveEvent], None],
+    ) -> None:
         self.name = name
         self._line = line
         self._copy = SettingsCopy()
         self._observer = Observer(line, name, on_lost_reference)
-        self._motion = AxisMotion(self._observer)
+        self._motion = AxisMotion(self._observer, publish)
         self.settings = SettingsOfAxis(self._observer, self._copy)
         self.program = ProgramMemory(self._observer, self._motion, self._copy)
 

@@ -10,6 +10,7 @@ from typing import Protocol
 
 from ..errors import CompaxError, MoveActiveError, MoveError, MoveStoppedError
 from ..link.contract import Lane
+from ..motion.events import DriveEvent
 from ..motion.moves import OnCancel, check_manner
 from ..motion.one_move import OneMove
 from ..motion.untracked import Untracked
@@ -55,9 +56,10 @@ class AxisMotion(OneMove[Pursuit, Look, str]):
 
     Args:
         observer: Of the axis.
+        publish: Called with what happens to motions, and with standstills after stops.
     """
 
-    def __init__(self, observer: Observer) -> None:
+    def __init__(self, observer: Observer, publish: Callable[[DriveEvent], None]) -> None:
         self._observer = observer
         self._axis_reports = AxisReports(observer)
         super().__init__(
@@ -67,6 +69,7 @@ class AxisMotion(OneMove[Pursuit, Look, str]):
             untracked=Untracked(self._command, self._axis_reports),
             memory=_Memory(),
             log=_log,
+            publish=publish,
         )
         self.may_be_in_entry = False
         """Whether the axis may be in program entry, where it stores what it is told, a look or a stop as well."""

@@ -4,7 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..motion.events import ConnectionLost, ConnectionRestored, DriveEvent, EventStream, UnexpectedText
+from ..motion.events import (
+    ConnectionLost,
+    ConnectionRestored,
+    DriveEvent,
+    EventStream,
+    Mark,
+    MoveAccepted,
+    MoveEnded,
+    Stopped,
+    UnexpectedText,
+)
 
 __all__ = [
     "AxesReset",
@@ -13,6 +23,10 @@ __all__ = [
     "ConnectionRestored",
     "DriveEvent",
     "EventStream",
+    "Mark",
+    "MoveAccepted",
+    "MoveEnded",
+    "Stopped",
     "UnexpectedText",
 ]
 
@@ -24,6 +38,10 @@ class AxesReset(DriveEvent):
     axes: str
     """Their names; in single mode none."""
     reason: str
+
+    def as_mark(self) -> Mark:
+        """Say it in a few words."""
+        return Mark("reset", None, f"{self.axes}: {self.reason}" if self.axes else self.reason)
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,3 +55,9 @@ class CommandDamaged(DriveEvent):
     axis: str
     holds: tuple[str, ...]
     """What the axis may have executed, without its name."""
+
+    def as_mark(self) -> Mark:
+        """Say it in a few words."""
+        return Mark(
+            "command damaged", None, f"{self.axis}: {', '.join(self.holds)}" if self.axis else ", ".join(self.holds)
+        )

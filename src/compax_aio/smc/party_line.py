@@ -89,7 +89,7 @@ class PartyLine:
         if name not in self._axes:
             if len(self._axes) >= MAX_AXES:
                 raise InvalidCommandError(f"a line has at most {MAX_AXES} axes (DCB p. 17)", device=self.name)
-            self._axes[name] = SmcAxis(self._line, name, self._on_lost_reference)
+            self._axes[name] = SmcAxis(self._line, name, self._on_lost_reference, self._events.publish)
         return self._axes[name]
 
     async def scan(
