@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from functools import partial
-from typing import Final, cast
+from typing import Any, Final, cast
 
 from ..errors import AnswerTimeoutError, CompaxError, ConnectionLostError, TransportError
 from ..transports.registry import open_transport
+from ..transports.url import shown_url
 from .contract import DeviceProtocol, Event, Hold, Lane, TurnOver
 from .exchanges import Exchange
 from .failures import Failures
@@ -22,6 +23,7 @@ from .port import Port
 from .reconnecting import Reconnecting
 from .seldom import Seldom
 from .stats import LinkStats
+from .taps import Asked, Closed, Ended, LineTap, Lost, Opening, Ready, Refused, tap_of
 from .turns import Turns
 from .wire import WireHistory
 
@@ -75,6 +77,7 @@ class Link(asyncio.Protocol):
         reconnecting: How a line that was lost is opened again; None: it is not.
         marker_timeout_s: How long a marker takes that is not answered; None: as long as an answer may.
         advice_on_silence: What a person should look at when nobody answers at all.
+        about: Says what device is there, and how it is talked to, for those who record the line.
     """
 
     def __init__(
@@ -90,6 +93,7 @@ class Link(asyncio.Protocol):
         reconnecting: Reconnecting | None = None,
         marker_timeout_s: float | None = None,
         advice_on_silence: str = "check power, cable, port, baud rate and handshake",
+        about: Callable[[], Mapping[str, object]] | None = None,
     ) -> None:
         self.stats = LinkStats()
         self.history = WireHistory()
@@ -107,7 +111,9 @@ class Link(asyncio.Protocol):
         self._greet = greet
         self._reconnecting = reconnecting
         self._loop = asyncio.get_running_loop()
-        self._port = Port(name, self.stats, self.history)
+        self._tap = tap_of(name, about)
+        self._asked = 0
+        self._port = Port(name, self.stats, self.history, self._tap)
         self._turns = Turns(
             protocol,
             name=name,
@@ -120,6 +126,7 @@ class Link(asyncio.Protocol):
             on_event=on_event,
             on_silence=self._note_silence,
             spares=self._came_during_attempt,
+            tap=self._tap,
         )
         self._url = ""
         self._is_closing = self._is_lost = False
@@ -149,6 +156,7 @@ class Link(asyncio.Protocol):
     async def _connect(self) -> None:
         self._turns.queue.is_admitted = False
         self._attempts += 1
+        self.stats.openings += 1
         in_step = self._turns.until_in_step()
         in_step.add_done_callback(lambda each: each.cancelled() or each.exception())  # if the opener fails, nobody asks
         try:
@@ -336,6 +344,10 @@ class Link(asyncio.Protocol):
     def resume(self) -> None:
         """Take a person's word that what the line is :attr:`held` for can do no harm, and get in step; else nothing."""
         self._turns.resume()
+
+    def extra_info(self, name: str) -> Any:
+        """Return what the transport says of itself, as ``serial``, its port; None if it says nothing of it."""
+        return self._port.extra_info(name)
 
     def recent(self) -> tuple[str, ...]:
         """Return the last exchanges of this line, oldest first, readable."""

@@ -5,9 +5,10 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable
-from typing import Final
+from typing import Any, Final
 
 from .stats import LinkStats
+from .taps import LetGo, LineTap, Opened, Received
 from .wire import WireHistory, readable
 
 __all__ = ["Port"]
@@ -34,12 +35,16 @@ class Port:
         name: For logs.
         stats: Bytes are counted there.
         history: The last ones are kept there.
+        tap: Is told of them, too.
     """
 
-    def __init__(self, name: str, stats: LinkStats, history: WireHistory) -> None:
+    def __init__(
+        self, name: str, stats: LinkStats, history: WireHistory, tap: LineTap | None = None
+    ) -> None:
         self._name = name
         self._stats = stats
         self._history = history
+        self._tap = tap
         self._loop = asyncio.get_running_loop()
         self._transport: asyncio.Transport | None = None
         self._unread = bytearray()
@@ -58,6 +63,12 @@ class Port:
         self._unread.clear()
         self.heard_at = self._loop.time()
         self._end = self._loop.create_future()
+        if self._tap is not None:
+            self._tap(Opened())
+
+    def extra_info(self, name: str) -> Any:
+        """Return what the transport says of itself under *name*; None if it says nothing, or is not there."""
+        return self._transport.get_extra_info(name) if self._transport is not None else None
 
     @property
     def is_stuck(self) -> bool:
@@ -91,7 +102,7 @@ class Port:
     def in_pieces(self, data: bytes, read: Callable[[bytes], None]) -> None:
         """Hand *data* to *read*: the first piece at once, each other a while later, before more is taken."""
         if len(data) <= _PIECE_BYTES and not self._unread:
-            read(data)
+            self._read(data, read)
             return
         is_at_it = bool(self._unread)
         self._unread += data
@@ -106,14 +117,20 @@ class Port:
         del self._unread[:_PIECE_BYTES]
         if self._unread:
             self._loop.call_later(_BETWEEN_PIECES_S, self._read_piece, transport, read)
-        read(piece)
+        self._read(piece, read)
         if not self._unread and transport is self._transport:
             transport.resume_reading()
+
+    def _read(self, piece: bytes, read: Callable[[bytes], None]) -> None:
+        if self._tap is not None:
+            self._tap(Received(piece))
+        read(piece)
 
     def hang_up(self) -> None:
         """Let go of the transport at once; it reports its end soon."""
         transport, self._transport = self._transport, None
         if transport is not None:
+            self._tell_let_go(transport)
             transport.abort()
 
     def let_go(self) -> None:
@@ -121,6 +138,7 @@ class Port:
         transport, self._transport = self._transport, None
         end = self._end
         if transport is not None and end is not None:
+            self._tell_let_go(transport)
             transport.close()
             self._loop.call_later(_CLOSE_GRACE_S, _abort_unless_ended, transport, end)
 
@@ -129,6 +147,7 @@ class Port:
         if self._end is None:
             return True
         if self._transport is not None:
+            self._tell_let_go(self._transport)
             self._transport.close()
         abort = self._loop.call_later(_CLOSE_GRACE_S, self.hang_up)
         try:
@@ -140,6 +159,10 @@ class Port:
             return True
         _log.error("%s: the transport did not report its end", self._name)
         return False
+
+    def _tell_let_go(self, transport: asyncio.Transport) -> None:
+        if self._tap is not None and not transport.is_closing():
+            self._tap(LetGo())
 
 
 def _abort_unless_ended(transport: asyncio.Transport, end: asyncio.Future[None]) -> None:
