@@ -11,6 +11,7 @@ from ..errors import AnswerTimeoutError, CommandRejectedError, ConnectionLostErr
 from ..link.contract import Event, Lane, TurnOver
 from ..link.link import Link
 from ..link.reconnecting import Reconnecting, Restored
+from ..link.taps import plain
 from .codecs import DriveStatus, decode_number, shows_active
 from .facts.device_errors import device_error
 from .protocol import Acknowledged, Answered, CompaxProtocol, Rejected, UnexpectedAnswer
@@ -63,6 +64,7 @@ class DriveLine:
                 "check power, cable (crossed, not straight), port and baud rate, and the handshake lines; a device "
                 "that takes longer to answer wants more answer_timeout_s"
             ),
+            about=lambda: {"device": "compax", "settings": plain(settings)},
         )
         self.last_position: float | None = None
         self.active_seen_at = -inf

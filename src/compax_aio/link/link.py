@@ -15,7 +15,7 @@ from typing import Any, Final, cast
 
 from ..errors import AnswerTimeoutError, CompaxError, ConnectionLostError, TransportError
 from ..transports.registry import open_transport
-from ..transports.url import shown_url
+from ..transports.url import TransportURL
 from .contract import DeviceProtocol, Event, Hold, Lane, TurnOver
 from .exchanges import Exchange
 from .failures import Failures
@@ -23,7 +23,7 @@ from .port import Port
 from .reconnecting import Reconnecting
 from .seldom import Seldom
 from .stats import LinkStats
-from .taps import Asked, Closed, Ended, LineTap, Lost, Opening, Ready, Refused, tap_of
+from .taps import Asked, Closed, Ended, Fact, LineTap, Lost, Opening, Ready, Refused, tap_of
 from .turns import Turns
 from .wire import WireHistory
 
@@ -154,14 +154,23 @@ class Link(asyncio.Protocol):
         self.admit()
 
     async def _connect(self) -> None:
+        url = TransportURL.parse(self._url)
         self._turns.queue.is_admitted = False
         self._attempts += 1
+        self._tell(Opening(str(url)))
+        try:
+            await self._connect_to(url)
+        except BaseException as error:
+            self._tell(Refused(str(error) or type(error).__name__))
+            raise
+
+    async def _connect_to(self, url: TransportURL) -> None:
         self.stats.openings += 1
         in_step = self._turns.until_in_step()
         in_step.add_done_callback(lambda each: each.cancelled() or each.exception())  # if the opener fails, nobody asks
         try:
             async with asyncio.timeout(self._opening_s):
-                await open_transport(self._url, self._take_end)
+                await open_transport(url, self._take_end)
         except BaseException:
             in_step.cancel()
             raise
@@ -190,6 +199,7 @@ class Link(asyncio.Protocol):
             await self._reconnecting.end()
         await self._close_port()
         self._turns.fail_waiting(self._lost)
+        self._tell(Closed())
 
     async def _close_port(self) -> None:
         if not await self._port.close():
@@ -223,6 +233,7 @@ class Link(asyncio.Protocol):
         """Let everything that waits go over the line."""
         if self._attempts > 1:
             self.stats.reconnects += 1
+        self._tell(Ready(self._attempts))
         self._turns.admit()
 
     def lose_patience(self) -> None:
@@ -234,6 +245,7 @@ class Link(asyncio.Protocol):
         self._is_lost = True
         loss = self._lost(None, error)
         self._turns.fail_waiting(lambda exchange: self._lost(exchange, error))
+        self._tell(Closed())
         self._on_lost(loss)
 
     @property
@@ -295,6 +307,8 @@ class Link(asyncio.Protocol):
         exchange = Exchange(
             text, lane, settles_late, survives_loss, self._attempts, self._loop.time(), on_sent, party, [waiter]
         )
+        if self._tap is not None:
+            self._tell_asked(self._tap, exchange, waiter)
         if self._silence is not None and not self.is_over:
             if lane is Lane.STOP:
                 self._turns.say_ahead(exchange)  # it may be heard, although nothing comes back
@@ -304,6 +318,16 @@ class Link(asyncio.Protocol):
             return waiter
         self._turns.put(exchange)
         return waiter
+
+    def _tell(self, fact: Fact) -> None:
+        if self._tap is not None:
+            self._tap(fact)
+
+    def _tell_asked(self, tap: LineTap, exchange: Exchange, waiter: asyncio.Future[TurnOver]) -> None:
+        self._asked += 1
+        number = exchange.number = self._asked
+        tap(Asked(number, exchange.text, exchange.lane, exchange.party))
+        waiter.add_done_callback(lambda each: tap(Ended.of(number, each)))
 
     def _takes(self, exchange: Exchange) -> bool:
         if self.is_over or self._port.is_there:
@@ -374,6 +398,7 @@ class Link(asyncio.Protocol):
     def connection_lost(self, exc: Exception | None) -> None:
         """Fail what tells something: nobody can say any more what becomes of it. What asks may wait for the line."""
         self._port.ended()
+        self._tell(Lost(None if exc is None else str(exc) or type(exc).__name__))
         self._silence = None
         self._turns.line_lost()
         was_admitted, self._turns.queue.is_admitted = self._turns.queue.is_admitted, False

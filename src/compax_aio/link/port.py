@@ -38,9 +38,7 @@ class Port:
         tap: Is told of them, too.
     """
 
-    def __init__(
-        self, name: str, stats: LinkStats, history: WireHistory, tap: LineTap | None = None
-    ) -> None:
+    def __init__(self, name: str, stats: LinkStats, history: WireHistory, tap: LineTap | None = None) -> None:
         self._name = name
         self._stats = stats
         self._history = history

@@ -31,6 +31,7 @@ from .failures import Failures
 from .port import Port
 from .seldom import Seldom
 from .stats import LinkStats
+from .taps import LineTap, Noticed, Sent, Way
 from .wire import WireHistory
 
 __all__ = ["Turns"]
@@ -52,6 +53,7 @@ class Turns:
         on_event: Called with every event that is not about turns, as soon as it is read.
         on_silence: Called when nobody has answered any marker.
         spares: Says what goes on waiting although there is no answer to what was sent until now.
+        tap: Is told what is written and noticed.
     """
 
     def __init__(
@@ -68,6 +70,7 @@ class Turns:
         on_event: Callable[[Event], None],
         on_silence: Callable[[], None],
         spares: Callable[[Exchange], bool],
+        tap: LineTap | None = None,
     ) -> None:
         self.lines_sent = 0
         self.queue = ExchangeQueue()
@@ -82,6 +85,7 @@ class Turns:
         self._on_event = on_event
         self._on_silence = on_silence
         self._spares = spares
+        self._tap = tap
         self._loop = asyncio.get_running_loop()
         self._reads_timer: asyncio.TimerHandle | None = None
         self._outstanding: Exchange | None = None
@@ -115,7 +119,7 @@ class Turns:
         """Write *stop*, which waits for the next line, on one that is about to be let go of."""
         if self._port.is_there and self._protocol.in_doubt and not self._protocol.is_busy and not self._port.is_stuck:
             self._send_ahead(stop)
-            self._flush()
+            self._flush(Way.AHEAD, stop)
 
     def until_in_step(self) -> asyncio.Future[None]:
         """Return a future that is done when the line is in step, or fails with all else that waits."""
@@ -131,7 +135,7 @@ class Turns:
     def receive(self, data: bytes) -> None:
         """Pass bytes in, events out."""
         self._protocol.receive(data)
-        self._flush(goes_on=True)
+        self._flush(Way.GOES_ON)
         self._take_events()
         if self._is_pursuing and self._protocol.stranger(time_is_over=False) is not None:
             self._give_up()
@@ -155,7 +159,7 @@ class Turns:
     def preempt(self, text: str) -> asyncio.Future[None]:
         """Write *text*, which the device heeds at any time; done when the line is in step again, or nobody answers."""
         self._protocol.preempt(text)
-        self._flush()
+        self._flush(Way.PREEMPT)
         self._take_events()
         self._begin_doubt()
         self._give_time()
@@ -208,7 +212,7 @@ class Turns:
                 self._outstanding = exchange
                 protocol.send(exchange.text)
                 exchange.is_on_wire = True
-                self._flush()
+                self._flush(Way.TURN, exchange)
                 self._began_at = self._loop.time()
                 self._give_time()
                 if exchange.on_sent is not None:
@@ -216,9 +220,12 @@ class Turns:
             else:
                 return
 
-    def _flush(self, *, goes_on: bool = False) -> None:
+    def _flush(self, way: Way, exchange: Exchange | None = None) -> None:
         if data := self._protocol.bytes_to_send():
+            goes_on = way is Way.GOES_ON
             self.lines_sent += not goes_on
+            if self._tap is not None and self._port.is_there:
+                self._tap(Sent(data, exchange.number if exchange is not None else None, way))
             self._port.write(data, goes_on=goes_on)
 
     def _give_time(self) -> None:
@@ -230,6 +237,8 @@ class Turns:
         self._is_reading = True
         try:
             for event in self._protocol.events():
+                if self._tap is not None and not isinstance(event, GoesOn):
+                    self._tap(Noticed.of(event))
                 self._handle(event)
         finally:
             self._is_reading = False
@@ -299,16 +308,18 @@ class Turns:
                 return False
             self._markers_left -= 1
             self._send_ahead(stop)
+            self._flush(Way.AHEAD, stop)
         elif stop is not None and self._may_send_ahead:
             # In turn with the markers, for half a line in the device's buffer may spoil either; the exchange itself
             # follows when in step.
             self._may_send_ahead = False
             self._send_ahead(stop)
+            self._flush(Way.AHEAD, stop)
         else:
             self._markers_left -= 1
             self._may_send_ahead = True
             self._protocol.send_marker()
-        self._flush()
+            self._flush(Way.MARKER)
         self._give_time()
         return True
 
@@ -371,7 +382,7 @@ class Turns:
         if not was_busy:
             return
         self._protocol.time_ran_out()
-        self._flush(goes_on=True)
+        self._flush(Way.GOES_ON)
         self._take_events()
         if self._protocol.is_busy:  # that was a pause, and it goes on
             self._give_time()

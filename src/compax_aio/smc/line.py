@@ -10,6 +10,7 @@ from ..errors import AnswerTimeoutError, CommandRejectedError, CompaxError, Conn
 from ..link.contract import Event, Lane, TurnOver
 from ..link.link import Link
 from ..link.reconnecting import Reconnecting, Restored
+from ..link.taps import plain
 from .codecs import AxisStatus, decode_number, decode_status
 from .facts import ESCAPE, Mode, Reply, command_of
 from .protocol import SmcProtocol
@@ -69,6 +70,7 @@ class SmcLine:
                 "check power, cable, port and baud rate, the mode that the axes were switched to, and their names; "
                 "a line with a slow echo (USB, a terminal server) wants more echo_timeout_s"
             ),
+            about=lambda: {"device": "smc", "mode": mode.value, "settings": plain(settings)},
         )
 
     # Asking and telling ---------------------------------------------------------------------------------------------
