@@ -19,6 +19,7 @@ from tests.promises.cable import Cable
 
 import compax_aio
 from compax_aio import CompaxError, Drive, DriveSettings, InvalidCommandError
+from compax_aio.compax.events import ConnectionRestored
 from compax_aio.link import port
 from compax_aio.link.contract import Lane
 from compax_aio.link.stats import LinkStats
@@ -171,6 +172,25 @@ async def test_counters_go_on_over_reconnects_and_each_of_those_is_counted_once(
     assert changed["resynchronisations"] == 3
     assert changed["exchanges"] > 3
     assert not {"timeouts", "late_answers", "strays"} & set(changed)
+    await drive.close()
+    await cable.pull()
+
+
+async def test_every_attempt_to_open_a_line_is_counted_while_it_is_lost() -> None:
+    far, cable = SimulatedDrive(name="x"), Cable()
+    await cable.plug(far)
+    drive = await compax_aio.connect(cable.url, name="x")
+    events = drive.events()
+    assert drive.stats.openings == 1
+    await cable.pull()
+    await asyncio.sleep(20)
+    tried = drive.stats.openings - 1
+    assert tried > 3
+    await cable.plug(far)
+    await drive.position()
+    restored = [await anext(events), await anext(events)][1]
+    assert isinstance(restored, ConnectionRestored)
+    assert drive.stats.openings - 1 == restored.attempts > tried
     await drive.close()
     await cable.pull()
 

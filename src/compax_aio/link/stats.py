@@ -26,6 +26,8 @@ class LinkStats:
     """Lines that were cut short, by the device or from here, and have no answer."""
     resynchronisations: int = 0
     """Times the line was brought back in step, the first after opening included."""
+    openings: int = 0
+    """Times the line was opened, or tried to be: while it is lost, this grows with every attempt."""
     reconnects: int = 0
     """Times the line was lost and came back."""
     late_answers: int = 0
