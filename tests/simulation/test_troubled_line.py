@@ -7,9 +7,10 @@ import asyncio
 import pytest
 
 from compax_aio.errors import TransportError
+from compax_aio.simulator.cable import Tamper
 from compax_aio.simulator.compax import Knobs, LogKind, SimulatedDrive
 from compax_aio.simulator.hunt.testimony import WireEntry, WireKind
-from compax_aio.simulator.hunt.troubled_line import Tamper, TroubledLine
+from compax_aio.simulator.hunt.troubled_line import TroubledLine
 from compax_aio.transports.registry import open_transport
 
 

@@ -7,10 +7,11 @@ from collections.abc import Callable
 from random import Random
 from typing import Any, Protocol
 
+from compax_aio.simulator.cable import Tamper
 from compax_aio.simulator.clock import VirtualClockLoop
 
 from .scenario import Trouble
-from .troubled_line import Tamper, TroubledLine
+from .troubled_line import TroubledLine
 
 __all__ = [
     "Arguments",

@@ -3,43 +3,23 @@
 from __future__ import annotations
 
 import asyncio
-from collections import deque
-from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import Any, Final
 
-from compax_aio.compax.facts.line import COMMAND_END, PROMPT
+from compax_aio.compax.facts.line import PROMPT
 from compax_aio.errors import TransportError
+from compax_aio.simulator.cable import Cable, Direction, Way
 from compax_aio.simulator.compax.drive import SimulatedDrive
 from compax_aio.simulator.line import DeviceLine, SimulatedDevice
 from compax_aio.transports.loopback import LoopbackListener, LoopbackTransport, create_pair
 
 from .testimony import WireEntry, WireKind
 
-__all__ = ["Direction", "Tamper", "TamperKind", "TroubledLine"]
+__all__ = ["TroubledLine"]
 
-Direction = Literal["to_drive", "to_host"]
-
-TamperKind = Literal["lose", "garble", "flip", "double", "insert", "cut", "lose_end"]
-
-_MOTION_BEGINS: Final = (b"P", b"!")
 _TOKEN_KEPT: Final = 64
 
 
-@dataclass(slots=True)
-class Tamper:
-    """Something that will be done to bytes of one direction, once."""
-
-    direction: Direction
-    kind: TamperKind
-    skip: int = 0
-    """So many bytes pass before."""
-    count: int = 1
-    """How many bytes are lost, garbled or doubled."""
-    data: bytes = b""
-    """What is inserted."""
-
-
-class TroubledLine(LoopbackListener):
+class TroubledLine(LoopbackListener, Cable):
     """
     ``loop://name`` for a client, and at its far end a simulated device, with all that can befall a line in between.
 
@@ -50,9 +30,6 @@ class TroubledLine(LoopbackListener):
         strangers: Where other drives are noted that were on it.
 
     Attributes:
-        delay_s: By direction: how much later bytes arrive; those behind them wait.
-        piece: The most bytes that are handed on at once; None: as they come.
-        vanishing: Half open: bytes vanish both ways, and nobody is told.
         refused: Nobody can connect.
         keeps: What the device says while nobody is connected is kept for who connects next, as device servers do.
     """
@@ -60,10 +37,8 @@ class TroubledLine(LoopbackListener):
     def __init__(
         self, name: str, device: SimulatedDevice, wire: list[WireEntry], strangers: list[SimulatedDrive] | None = None
     ) -> None:
-        super().__init__(name, asyncio.Protocol)
-        self.delay_s: dict[Direction, float] = {"to_drive": 0.0, "to_host": 0.0}
-        self.piece: int | None = None
-        self.vanishing = False
+        LoopbackListener.__init__(self, name, asyncio.Protocol)
+        Cable.__init__(self)
         self.refused = False
         self.keeps = False
         self._loop = asyncio.get_running_loop()
@@ -71,7 +46,6 @@ class TroubledLine(LoopbackListener):
         self._wire = wire
         self._strangers = [] if strangers is None else strangers
         self._kept: list[bytes] | None = None
-        self._tampers: list[Tamper] = []
         self._way: _Way | None = None
         self._is_held = False
 
@@ -102,10 +76,6 @@ class TroubledLine(LoopbackListener):
             line.connect(self._kept.append)
 
     # What troubles do
-
-    def add(self, tamper: Tamper) -> None:
-        """Let something happen to the bytes that come next."""
-        self._tampers.append(tamper)
 
     def hold(self, held: bool) -> None:
         """Hold what the client writes, as Xoff does: it stays in the client's buffer."""
@@ -146,16 +116,9 @@ class TroubledLine(LoopbackListener):
 
     def heal(self) -> None:
         """End all troubles of the line."""
-        self._tampers.clear()
-        self.delay_s = {"to_drive": 0.0, "to_host": 0.0}
-        self.piece = None
+        super().heal()
         self.refused = False
         self.hold(held=False)
-
-    @property
-    def is_usual(self) -> bool:
-        """Whether nothing is done to bytes now."""
-        return not (self._tampers or self.vanishing or self.piece or any(self.delay_s.values()))
 
     # What is noted
 
@@ -167,44 +130,6 @@ class TroubledLine(LoopbackListener):
         """Note bytes, or the beginning or end of a connection."""
         self._wire.append(WireEntry(self._loop.time(), kind, data))
 
-    def tampered(self, direction: Direction, data: bytes) -> tuple[bytes, bool]:
-        """Do to *data* what is due; also say whether the connection is cut behind it."""
-        if not self._tampers:
-            return data, False
-        for tamper in [each for each in self._tampers if each.direction == direction]:
-            if tamper.kind == "lose_end":
-                if data.startswith(_MOTION_BEGINS) and data.endswith(COMMAND_END):
-                    self._spend(tamper)
-                    data = data.removesuffix(COMMAND_END)
-            elif tamper.skip >= len(data):
-                tamper.skip -= len(data)
-            else:
-                self._spend(tamper)
-                at = tamper.skip
-                if tamper.kind == "cut":
-                    return data[:at], True
-                data = data[:at] + _changed(tamper, data[at : at + tamper.count]) + data[at + tamper.count :]
-        return data, False
-
-    def _spend(self, tamper: Tamper) -> None:
-        self._tampers.remove(tamper)
-        self.note(f"{tamper.kind} {tamper.direction}")
-
-
-def _flipped(byte: int) -> int:
-    """Make another digit, letter or sign of one, as two wrong bits do where nobody checks parity."""
-    return byte ^ 1 if chr(byte).isalnum() and chr(byte ^ 1).isalnum() else byte
-
-
-def _changed(tamper: Tamper, data: bytes) -> bytes:
-    if tamper.kind == "garble":
-        return bytes(byte | 0x80 for byte in data)  # a parity or framing error
-    if tamper.kind == "flip":
-        return bytes(_flipped(byte) for byte in data)
-    if tamper.kind == "double":
-        return data + data
-    return tamper.data + data if tamper.kind == "insert" else b""
-
 
 class _Way(asyncio.Protocol):
     """The far end of one connection: hands bytes on, as fast or slowly as the line lets them."""
@@ -212,10 +137,8 @@ class _Way(asyncio.Protocol):
     def __init__(self, line: TroubledLine, device: DeviceLine) -> None:
         self._line = line
         self._device = device
-        self._loop = asyncio.get_running_loop()
         self._transport: LoopbackTransport | None = None
-        self._waiting: dict[Direction, deque[bytes]] = {"to_drive": deque(), "to_host": deque()}
-        self._open_at: dict[Direction, float] = {"to_drive": 0.0, "to_host": 0.0}
+        self._way = Way(line, self._deliver, self.end)
         self._token = b""
         self.last_token = b""
         """The last answer or message that has come, with its prompt."""
@@ -229,11 +152,12 @@ class _Way(asyncio.Protocol):
         self.hold(self._line._is_held)  # noqa: SLF001
 
     def data_received(self, data: bytes) -> None:
-        self._hand_on("to_drive", data)
+        self._way.hand_on("to_drive", data)
 
     def connection_lost(self, _: Exception | None) -> None:
         if self._transport is not None:
             self._transport = None
+            self._way.end()
             self._device.disconnect()
             self._line.hung_up(self._device)
 
@@ -242,7 +166,7 @@ class _Way(asyncio.Protocol):
         self._token = (self._token + data)[-_TOKEN_KEPT:]
         if self._token.endswith(PROMPT):
             self.last_token, self._token = self._token, b""
-        self._hand_on("to_host", data)
+        self._way.hand_on("to_host", data)
 
     def hold(self, held: bool) -> None:
         """Leave what the client writes with the client, or take it."""
@@ -255,49 +179,15 @@ class _Way(asyncio.Protocol):
         """Hang up."""
         if self._transport is not None:
             transport, self._transport = self._transport, None
+            self._way.end()
             self._device.disconnect()
             transport.abort()
             self._line.hung_up(self._device)
 
-    def _hand_on(self, direction: Direction, data: bytes) -> None:
-        if self._transport is None:
-            return
-        line = self._line
-        if line.is_usual and not self._waiting[direction]:
-            self._deliver(direction, data)
-            return
-        if line.vanishing:
-            line.note(f"vanished {direction}")
-            return
-        data, is_cut = self._line.tampered(direction, data)
-        piece = self._line.piece or len(data) or 1
-        for begin in range(0, len(data), piece):
-            self._later(direction, data[begin : begin + piece])
-        if is_cut:
-            self._later(direction, b"")
-
-    def _later(self, direction: Direction, data: bytes) -> None:
-        """Hand *data* on when its time has come; a line that is not in trouble does so at once."""
-        waiting, now = self._waiting[direction], self._loop.time()
-        at = now + self._line.delay_s[direction] * (1 if self._line.piece is None else 0.25)
-        if not waiting and at <= now and self._line.piece is None:
-            self._deliver(direction, data)
-            return
-        self._open_at[direction] = max(at, self._open_at[direction])
-        waiting.append(data)
-        self._loop.call_at(self._open_at[direction], self._deliver_next, direction)
-
-    def _deliver_next(self, direction: Direction) -> None:
-        if self._waiting[direction]:
-            self._deliver(direction, self._waiting[direction].popleft())
-
     def _deliver(self, direction: Direction, data: bytes) -> None:
         if self._transport is None:
             return
-        if not data:
-            self._line.note("cut")
-            self.end()
-        elif direction == "to_drive":
+        if direction == "to_drive":
             self._line.note_bytes(WireKind.ARRIVED, data)
             self._device.receive(data)
         else:

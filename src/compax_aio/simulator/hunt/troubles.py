@@ -10,6 +10,7 @@ from random import Random
 from typing import Final
 
 from compax_aio.compax.facts.line import PROMPT
+from compax_aio.simulator.cable import Tamper
 from compax_aio.simulator.compax.drive import SimulatedDrive
 from compax_aio.simulator.compax.instructions import MoveTo, Stop
 from compax_aio.simulator.compax.knobs import Knobs
@@ -17,7 +18,7 @@ from compax_aio.simulator.compax.refusals import RefusedError
 
 from .line_troubles import Arguments, cut, half_open, hold, nothing, one_of, other_host, slow_line, stall, tamper
 from .scenario import Trouble
-from .troubled_line import Tamper, TroubledLine
+from .troubled_line import TroubledLine
 
 __all__ = ["LASTS_S", "PANEL_TARGET", "TROUBLES", "Far", "TroubleKind", "befall"]
 
