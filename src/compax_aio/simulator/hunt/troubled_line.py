@@ -7,14 +7,14 @@ from typing import Any, Final
 
 from compax_aio.compax.facts.line import PROMPT
 from compax_aio.errors import TransportError
-from compax_aio.simulator.cable import Cable, Direction, Way
+from compax_aio.simulator.cable import Cable, Direction, Tamper, Way
 from compax_aio.simulator.compax.drive import SimulatedDrive
 from compax_aio.simulator.line import DeviceLine, SimulatedDevice
 from compax_aio.transports.loopback import LoopbackListener, LoopbackTransport, create_pair
 
 from .testimony import WireEntry, WireKind
 
-__all__ = ["TroubledLine"]
+__all__ = ["Direction", "Tamper", "TroubledLine"]
 
 _TOKEN_KEPT: Final = 64
 
