@@ -171,17 +171,16 @@ async def test_a_link_that_somebody_else_has_made_meanwhile_stays(tmp_path: Path
 
 async def test_what_a_held_drive_is_sent_waits_for_it() -> None:
     drive = SimulatedDrive()
-    terminal = PseudoTerminal(DeviceLine.of(drive))
-    port = os.open(terminal.path, os.O_RDWR | os.O_NOCTTY)
-    try:
-        terminal.pause_reading()
-        os.write(port, b"S1\r")
-        await asyncio.sleep(1)
-        assert drive.log.texts(LogKind.LINE) == []
-        terminal.resume_reading()
-        terminal.resume_reading()
-        await asyncio.sleep(1)
-        assert drive.log.texts(LogKind.LINE) == ["S1"]
-    finally:
-        os.close(port)
-        terminal.close()
+    line = DeviceLine.of(drive)
+    line.hold(held=True)
+    async with serve_pty(drive) as url:
+        port = os.open(url.removeprefix("serial://"), os.O_RDWR | os.O_NOCTTY)
+        try:
+            os.write(port, b"S1\r")
+            await asyncio.sleep(1)
+            assert drive.log.texts(LogKind.LINE) == []
+            line.hold(held=False)
+            await asyncio.sleep(1)
+            assert drive.log.texts(LogKind.LINE) == ["S1"]
+        finally:
+            os.close(port)

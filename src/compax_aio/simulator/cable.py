@@ -51,8 +51,13 @@ class Cable:
         self.vanishing = False
         self._tampers: list[Tamper] = []
 
+    # Whoever wants to know has a cable of a kind of their own.
+
     def note(self, what: str) -> None:
-        """Take note of something that befell the line; whoever wants to know of it has a cable of their own kind."""
+        """Take note of something that befell the line."""
+
+    def cut(self) -> None:
+        """Take note that the connection ends behind what has arrived."""
 
     @property
     def is_usual(self) -> bool:

@@ -8,6 +8,8 @@ from typing import Protocol, cast
 
 from compax_aio.errors import TransportError
 
+from .cable import Cable, Direction, Way
+
 __all__ = ["Connection", "DeviceLine", "Host", "SimulatedDevice"]
 
 
@@ -58,6 +60,10 @@ class DeviceLine:
         self._device = device
         self._loop = loop
         self._write: Callable[[bytes], None] | None = None
+        self._hold: Callable[[bool], None] | None = None
+        self._is_held = False
+        self._cable: Cable | None = None
+        self._way: Way | None = None
         self._timer: asyncio.TimerHandle | None = None
         device.served_by = self
 
@@ -80,9 +86,17 @@ class DeviceLine:
         """Whether somebody is connected."""
         return self._write is not None
 
-    def connect(self, write: Callable[[bytes], None]) -> None:
+    def lay(self, cable: Cable) -> None:
+        """Let what goes over this line befall what *cable* says, from the next connection on."""
+        self._cable = cable
+
+    def connect(self, write: Callable[[bytes], None], hold: Callable[[bool], None] | None = None) -> None:
         """
         Connect somebody who is sent bytes by *write*.
+
+        Args:
+            write: Called with bytes for them.
+            hold: Called to leave what they write with them (True), or to take it again; None: they cannot be held.
 
         Raises:
             TransportError: Somebody else is connected.
@@ -93,17 +107,31 @@ class DeviceLine:
                 hint="close that connection first; a serial line has two ends",
             )
         self._device.connect(self._loop.time())
-        self._write = write
+        self._write, self._hold = write, hold
+        if self._cable is not None:
+            self._way = Way(self._cable, self._arrived, self._cable.cut)
+        if self._is_held:
+            self.hold(held=True)
         self.changed()
 
     def receive(self, data: bytes) -> None:
         """Take bytes from who is connected."""
-        self._device.receive(data, self._loop.time())
-        self.changed()
+        if self._way is None:
+            self._arrived("to_drive", data)
+        else:
+            self._way.hand_on("to_drive", data)
+
+    def hold(self, held: bool) -> None:
+        """Leave what is written to the device with who is connected, now or later, as Xoff does; or take it again."""
+        self._is_held = held
+        if self._hold is not None:
+            self._hold(held)
 
     def disconnect(self) -> None:
-        """Let go of who was connected."""
-        self._write = None
+        """Let go of who was connected; what was on its way is lost."""
+        if self._way is not None:
+            self._way.end()
+        self._write = self._hold = self._way = None
         self._device.disconnect(self._loop.time())
 
     def time(self) -> float:
@@ -122,8 +150,18 @@ class DeviceLine:
             self._timer = None
         if self._timer is None and at is not None and not self._loop.is_closed():
             self._timer = self._loop.call_at(at, self._wake, at)
-        if output and self._write is not None:
-            self._write(output)
+        if output and self._way is not None:
+            self._way.hand_on("to_host", output)
+        elif output:
+            self._arrived("to_host", output)
+
+    def _arrived(self, direction: Direction, data: bytes) -> None:
+        """Take what has come through: to the device, or to who is connected."""
+        if direction == "to_drive":
+            self._device.receive(data, self._loop.time())
+            self.changed()
+        elif self._write is not None:
+            self._write(data)
 
     def _wake(self, at: float) -> None:
         self._timer = None
@@ -153,7 +191,7 @@ class Connection(asyncio.Protocol):
             return
         self._transport = line
         self._connections.add(self)
-        self._line.connect(self._send)
+        self._line.connect(self._send, self._hold)
 
     def data_received(self, data: bytes) -> None:
         """Hand bytes to the device."""
@@ -179,6 +217,12 @@ class Connection(asyncio.Protocol):
         """Hang up."""
         if self._transport is not None:
             self._transport.abort()
+
+    def _hold(self, held: bool) -> None:
+        if self._transport is not None and held:
+            self._transport.pause_reading()
+        elif self._transport is not None:
+            self._transport.resume_reading()
 
     def _send(self, data: bytes) -> None:
         if self._transport is not None and not self._overrun:

@@ -66,36 +66,32 @@ class PseudoTerminal:
             self.path = os.ttyname(self._port_end)
             rate = f"?baudrate={line.baudrate}" if line.baudrate not in {0, _USUAL_RATE} else ""
             self.url = f"serial://{self.path if self._link is None else self._link.absolute()}{rate}"
-            line.connect(self._send)
+            self._hold(held=False)
+            line.connect(self._send, self._hold)
             try:
                 self._make_link()
             except BaseException:
                 line.disconnect()
                 raise
         except BaseException:
+            self._hold(held=True)
             self._close_both()
             raise
-        self._is_reading = True
-        self._loop.add_reader(self._device_end, self._receive)
 
     def close(self) -> None:
         """Take the port away; a program that has it open finds it hung up."""
-        self.pause_reading()
+        self._hold(held=True)
         if self._pause is not None:
             self._pause.cancel()
         self._line.disconnect()
         self._take_link_away()
         self._close_both()
 
-    def pause_reading(self) -> None:
+    def _hold(self, held: bool) -> None:
         """Leave what the host writes in the buffers, as a device does that holds it by its handshake."""
-        self._loop.remove_reader(self._device_end)
-        self._is_reading = False
-
-    def resume_reading(self) -> None:
-        """Take what the host writes again."""
-        if not self._is_reading:
-            self._is_reading = True
+        if held:
+            self._loop.remove_reader(self._device_end)
+        else:
             self._loop.add_reader(self._device_end, self._receive)
 
     # Bytes

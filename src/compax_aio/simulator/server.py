@@ -21,7 +21,17 @@ from .smc.knobs import Knobs as LineKnobs
 from .smc.line import SimulatedPartyLine
 from .state_file import write_state_file
 
-__all__ = ["drive_named", "line_named", "open_simulator", "serve_loopback", "serve_pty", "serve_tcp", "serve_tcp_group"]
+__all__ = [
+    "drive_named",
+    "kept",
+    "line_named",
+    "open_simulator",
+    "serve_loopback",
+    "serve_pty",
+    "serve_tcp",
+    "serve_tcp_group",
+    "state_files",
+]
 
 _FORM: Final = "sim://compax?name=x&answer_time_s=0.005"
 _NAME: Final = "name"
@@ -126,7 +136,7 @@ async def serve_tcp(
             hint="take another port, or 0 for a free one",
         ) from error
     try:
-        with _kept(device, state):
+        with kept(device, state):
             port = server.sockets[0].getsockname()[1]
             yield f"tcp://[{host}]:{port}" if ":" in host else f"tcp://{host}:{port}"
     finally:
@@ -155,7 +165,7 @@ async def serve_tcp_group(
         raise TransportError("a simulated device is there twice", hint="make one for each name")
     if port and port + len(devices) - 1 > _LAST_PORT:
         raise TransportError(f"there are no {len(devices)} ports from {port} on", hint="begin with a smaller one")
-    files = _files_in(state, devices)
+    files = state_files(state, devices)
     async with AsyncExitStack() as stack:
         urls: dict[str, str] = {}
         for place, (name, device) in enumerate(devices.items()):
@@ -189,7 +199,7 @@ async def serve_pty(
 
     terminal = PseudoTerminal(DeviceLine.of(device), link)
     try:
-        with _kept(device, state):
+        with kept(device, state):
             yield terminal.url
     finally:
         terminal.close()
@@ -212,15 +222,20 @@ async def serve_loopback(device: SimulatedDevice, name: str, *, state: _File | N
     connections: set[Connection] = set()
     with await listen(name, lambda: Connection(line, connections)) as listener:
         try:
-            with _kept(device, state):
+            with kept(device, state):
                 yield listener.url
         finally:
             await _hang_up(connections)
 
 
 @contextmanager
-def _kept(device: SimulatedDevice, file: _File | None) -> Iterator[None]:
-    """Load the state of *device* if there is a file, and save it at the end."""
+def kept(device: SimulatedDevice, file: _File | None) -> Iterator[None]:
+    """
+    Load the state of *device* if there is a file, and save it at the end of the block.
+
+    Raises:
+        TransportError: The file cannot be used.
+    """
     if file is None:
         yield
         return
@@ -253,8 +268,13 @@ def _state_in(path: Path, device: _Lasting) -> dict[str, Any] | None:
         raise TransportError(f"no state can be loaded: {error}", hint="mend the file, or take it away") from error
 
 
-def _files_in(folder: _File | None, devices: Mapping[str, SimulatedDevice]) -> Mapping[str, Path]:
-    """Return the file of each name, in a folder that is there; those that exist can be loaded."""
+def state_files(folder: _File | None, devices: Mapping[str, SimulatedDevice]) -> Mapping[str, Path]:
+    """
+    Return the file of each name, in a folder that is made if it is not there; those that exist can be loaded.
+
+    Raises:
+        TransportError: A name can be no file, or a file or the folder cannot be used.
+    """
     if folder is None:
         return {}
     for name in devices:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
@@ -67,14 +68,21 @@ class Log(deque[LogEntry]):
 
     Args:
         entries: How many are kept.
+
+    Attributes:
+        on_entry: Called with each that is added; None: nobody wants to know.
     """
 
     def __init__(self, entries: int = MAX_ENTRIES) -> None:
         super().__init__(maxlen=entries)
+        self.on_entry: Callable[[LogEntry], None] | None = None
 
     def add(self, at: float, kind: LogKind, text: str = "") -> None:
         """Append an entry."""
-        self.append(LogEntry(at, kind, text))
+        entry = LogEntry(at, kind, text)
+        self.append(entry)
+        if self.on_entry is not None:
+            self.on_entry(entry)
 
     def texts(self, *kinds: LogKind) -> list[str]:
         """List the texts of all entries of *kinds*, oldest first."""
