@@ -156,25 +156,33 @@ class NumberedValues:
         await asyncio.get_running_loop().run_in_executor(None, work)
         return values
 
-    async def diff(self, path: str | Path) -> tuple[Difference, ...]:
+    async def diff(self, path: str | Path, *, on_progress: Progress | None = None) -> tuple[Difference, ...]:
         """
         Compare a saved file with the drive; only what differs, in the order of numbers.
+
+        Args:
+            path: A file of :meth:`save`.
+            on_progress: Called after each value that was read.
 
         Raises:
             InvalidCommandError: It is no such file, or holds what cannot be said to the drive.
             OSError: It cannot be read.
         """
-        return await self._compare(await self._load(path))
+        return await self._compare(await self._load(path), on_progress)
 
-    async def _compare(self, values: Mapping[int, float]) -> tuple[Difference, ...]:
+    async def _compare(
+        self, values: Mapping[int, float], on_progress: Progress | None = None
+    ) -> tuple[Difference, ...]:
         differences = []
-        for number, value in values.items():
+        for done, (number, value) in enumerate(values.items(), start=1):
             try:
                 in_drive: float | None = await self.read(number)
             except CommandRejectedError:
                 in_drive = None
             if in_drive != value:
                 differences.append(Difference(self._name(number), number, value, in_drive))
+            if on_progress is not None:
+                on_progress(done, len(values))
         return tuple(differences)
 
     async def restore(
@@ -199,7 +207,12 @@ class NumberedValues:
         return await self.write_several(await self._load(path), dry_run=dry_run, on_progress=on_progress)
 
     async def write_several(
-        self, values: Mapping[int, float], *, dry_run: bool = False, on_progress: Progress | None = None
+        self,
+        values: Mapping[int, float],
+        *,
+        dry_run: bool = False,
+        on_progress: Progress | None = None,
+        on_compared: Progress | None = None,
     ) -> Restored:
         """
         Write those of *values* that the drive does not have yet, as :meth:`restore` does, with what it raises.
@@ -208,12 +221,13 @@ class NumberedValues:
             values: By number.
             dry_run: Only say what would be written.
             on_progress: Called after each value that was written.
+            on_compared: Called after each value that was read before, to be compared.
         """
         values = {self._table.index(number): value for number, value in values.items()}
         for number, value in values.items():
             self._written(number, value)
         wanted = {number: self._table.rounded(number, values[number]) for number in sorted(values)}
-        changes = self._changes(await self._compare(wanted))
+        changes = self._changes(await self._compare(wanted, on_compared))
         if not dry_run:
             await self._write_all(changes, on_progress)
         return Restored(

@@ -1,0 +1,46 @@
+"""A question to the person at the terminal, who may also interrupt it; the line is served meanwhile."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import sys
+from typing import Final
+
+from compax_aio import InvalidCommandError
+
+from .printing import notes_console
+
+__all__ = ["confirm", "expect_somebody"]
+
+_LONGEST: Final = 1024
+
+
+def expect_somebody(*, yes: bool) -> None:
+    """
+    Do nothing if *yes* was said in advance, or if somebody can be asked.
+
+    Raises:
+        InvalidCommandError: Nobody can be asked.
+    """
+    if not yes and not sys.stdin.isatty():
+        raise InvalidCommandError("this asks before it writes, and nobody is at a terminal", hint="say --yes")
+
+
+async def confirm(question: str) -> bool:
+    """Ask a question that is answered by y or n; everything else, and the end of the input, is a no."""
+    loop, descriptor = asyncio.get_running_loop(), sys.stdin.fileno()
+    answer: asyncio.Future[bytes] = loop.create_future()
+
+    def take() -> None:
+        loop.remove_reader(descriptor)
+        if not answer.done():
+            answer.set_result(os.read(descriptor, _LONGEST))
+
+    notes_console().print(f"{question} [y/N] ", end="", markup=False)
+    loop.add_reader(descriptor, take)
+    try:
+        said = await answer
+    finally:
+        loop.remove_reader(descriptor)
+    return said.strip().lower() in {b"y", b"yes"}
