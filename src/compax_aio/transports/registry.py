@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import difflib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Final, Protocol
 
 from compax_aio.errors import TransportError
@@ -14,7 +15,7 @@ from .url import TransportURL
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
-__all__ = ["ENTRY_POINT_GROUP", "Opener", "ProtocolFactory", "open_transport"]
+__all__ = ["ENTRY_POINT_GROUP", "Opener", "ProtocolFactory", "open_transport", "opened_by"]
 
 ENTRY_POINT_GROUP: Final = "compax_aio.transports"
 
@@ -68,6 +69,26 @@ async def open_transport(url: str | TransportURL, protocol_factory: ProtocolFact
         return await opener(url, protocol_factory)
     except OSError as exc:
         raise TransportError(f"{url} could not be opened: {str(exc) or type(exc).__name__}") from exc
+
+
+@contextmanager
+def opened_by(opener: Opener, scheme: str) -> Iterator[None]:
+    """
+    Let *opener* open all URLs of *scheme* until the block is left, whatever is installed for it: for tests.
+
+    Args:
+        opener: What opens them.
+        scheme: In lower case, without ``://``.
+    """
+    before = _openers.get(scheme)
+    _openers[scheme] = opener
+    try:
+        yield
+    finally:
+        if before is None:
+            del _openers[scheme]
+        else:
+            _openers[scheme] = before
 
 
 def _find(scheme: str) -> Opener:
