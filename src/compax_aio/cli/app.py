@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Sequence
+from importlib import import_module
 from importlib.metadata import version
 from typing import Final
 
@@ -56,12 +58,30 @@ _COMMANDS: Final = (
     (_MORE, "smc", "smc:app", "AMS SMC steppers: scan, status, move, stop, programs."),
 )
 
+_ROOM: Final = "compax_aio.cli"
+
 for _group, _name, _place, _help in _COMMANDS:
-    app.command(f"compax_aio.cli.{_place}", name=_name, group=_group, help=_help)
+    app.command(f"{_ROOM}.{_place}", name=_name, group=_group, help=_help)
 
 app.register_install_completion_command(group=_MORE)
 
 
 def run(words: Sequence[str]) -> int:
     """Carry out the command that *words* name; returns the exit code."""
-    return run_words(app, words)
+    return run_words(app, words, prepare=_let_help_teach)
+
+
+def _let_help_teach(words: Sequence[str]) -> None:
+    """
+    Give the command that is called its whole help: the line in the list of commands stands in its place until then.
+
+    The list must not import what it lists, so it has lines of its own.
+    """
+    place = next((place for _, name, place, _ in _COMMANDS if [name] == list(words[:1])), None)
+    if place is None:
+        return
+    module, _, attribute = place.partition(":")
+    target = getattr(import_module(f"{_ROOM}.{module}"), attribute)
+    told = target.help if isinstance(target, App) else inspect.getdoc(target)
+    if told:  # asked for first, for the list's line takes its place as soon as the command is found
+        app[words[0]].help = told

@@ -11,7 +11,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 import compax_aio
-from compax_aio import Drive, DriveSettings
+from compax_aio import CompaxError, Drive, DriveSettings, InvalidCommandError
 
 __all__ = ["DriveLine", "Url"]
 
@@ -37,16 +37,48 @@ class DriveLine:
 
     @asynccontextmanager
     async def open(self, url: str) -> AsyncIterator[Drive]:
-        """Connect to the drive; leaving the block stops what was started and closes the line."""
+        """
+        Connect to the drive; leaving the block stops what was started and closes the line.
+
+        A block that fails raises its own error, with a note if the drive could not be stopped as it was left.
+        """
+        settings = self.drive_settings()
+        async with self.recorded():
+            drive = await compax_aio.connect(url, name=self.name, settings=settings)
+            try:
+                yield drive
+            except CompaxError as error:
+                try:
+                    await drive.close()
+                except CompaxError as on_leaving:
+                    error.add_note(f"as the line was closed: {on_leaving}")
+                raise
+            finally:
+                await drive.close()
+
+    @asynccontextmanager
+    async def recorded(self) -> AsyncIterator[None]:
+        """Record what goes over lines that are opened in this block, if that is wanted."""
         async with AsyncExitStack() as stack:
             if self.trace is not None:
                 from compax_aio.recording import record_trace  # noqa: PLC0415 - few need it
 
                 await stack.enter_async_context(record_trace(self.trace))
-            yield await stack.enter_async_context(
-                compax_aio.connect(url, name=self.name, settings=self.drive_settings())
-            )
+            yield
 
     def drive_settings(self) -> DriveSettings:
-        """Return the settings of the file, or the defaults without one."""
-        return DriveSettings() if self.settings is None else DriveSettings.load(self.settings)
+        """
+        Return the settings of the file, or the defaults without one.
+
+        Raises:
+            InvalidCommandError: The file cannot be read, or says something that cannot be meant.
+        """
+        if self.settings is None:
+            return DriveSettings()
+        try:
+            return DriveSettings.load(self.settings)
+        except OSError as error:
+            raise InvalidCommandError(
+                f"the settings file {self.settings} cannot be read: {error.strerror or error}",
+                hint="`compax probe URL -o FILE` writes one",
+            ) from error

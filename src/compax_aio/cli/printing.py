@@ -8,9 +8,10 @@ import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum
+from math import isfinite
 from pathlib import Path
 from types import NoneType
-from typing import Annotated, Any
+from typing import Annotated, Any, TextIO
 
 from cyclopts import Parameter
 from rich.console import Console, RenderableType
@@ -19,7 +20,7 @@ from rich.text import Text
 from ..errors import CompaxError
 from .exit_codes import exit_code_of
 
-__all__ = ["Printing", "as_json", "notes_console", "tell_error"]
+__all__ = ["Printing", "as_json", "notes_console", "tell_error", "tell_warning"]
 
 
 def as_json(value: Any) -> Any:
@@ -34,7 +35,8 @@ def as_json(value: Any) -> Any:
         return {str(key): as_json(each) for key, each in value.items()}
     if isinstance(value, Iterable) and not isinstance(value, str | bytes):
         return [as_json(each) for each in value]
-    return value if isinstance(value, bool | int | float | NoneType) else str(value)
+    is_plain = isinstance(value, bool | int | NoneType) or (isinstance(value, float) and isfinite(value))
+    return value if is_plain else str(value)
 
 
 @Parameter(name="*")
@@ -48,7 +50,7 @@ class Printing:
     def show(self, data: Any, people: RenderableType | None = None) -> None:
         """Print *data* as one line of JSON, or what *people* read in its place."""
         if self.json:
-            print(json.dumps(as_json(data), ensure_ascii=False), flush=True)  # noqa: T201
+            print(_document(as_json(data), sys.stdout), flush=True)  # noqa: T201
         elif people is not None:
             Console(highlight=False, soft_wrap=isinstance(people, str | Text)).print(people, markup=False)
 
@@ -66,11 +68,11 @@ def notes_console() -> Console:
 def tell_error(error: BaseException, *, as_document: bool) -> None:
     """Say *error* on the error stream, as a person or a program reads it; never with a traceback."""
     if as_document:
-        print(json.dumps({"error": _error_document(error)}, ensure_ascii=False), file=sys.stderr)  # noqa: T201
+        print(_document({"error": _error_document(error)}, sys.stderr), file=sys.stderr)  # noqa: T201
         return
     kind = "" if isinstance(error, OSError) else f"{type(error).__name__}: "
     console = notes_console()
-    console.print(Text.assemble((kind, "bold red"), str(error) or type(error).__name__))
+    console.print(Text.assemble((kind, "bold red"), _told(error)))
     for note in getattr(error, "__notes__", ()):
         console.print(Text(note))
     if isinstance(error, CompaxError) and error.exchanges:
@@ -79,8 +81,30 @@ def tell_error(error: BaseException, *, as_document: bool) -> None:
             console.print(Text(f"  {line}", style="dim"))
 
 
+def tell_warning(text: str, *, as_document: bool) -> None:
+    """Say beside the results what is no error, and should be known."""
+    if as_document:
+        print(_document({"warning": text}, sys.stderr), file=sys.stderr)  # noqa: T201
+    else:
+        notes_console().print(Text.assemble(("warning: ", "yellow"), text))
+
+
+def _told(error: BaseException) -> str:
+    """Write an error in one line; those of the system by what they are about, without their number."""
+    if isinstance(error, OSError) and error.strerror:
+        about = f"{error.filename}: " if error.filename is not None else ""
+        return f"{about}{error.strerror}"
+    return str(error) or type(error).__name__
+
+
+def _document(told: Any, stream: TextIO) -> str:
+    """Write one line of JSON that *stream* can take, whatever characters it knows."""
+    knows_all = (getattr(stream, "encoding", None) or "").lower().startswith("utf")
+    return json.dumps(told, ensure_ascii=not knows_all)
+
+
 def _error_document(error: BaseException) -> dict[str, Any]:
-    told: dict[str, Any] = {"kind": type(error).__name__, "text": str(error), "exit_code": exit_code_of(error)}
+    told: dict[str, Any] = {"kind": type(error).__name__, "text": _told(error), "exit_code": exit_code_of(error)}
     if isinstance(error, CompaxError):
         for name in ("what", "device", "sent", "received", "hint", "code", "exchanges"):
             told[name] = as_json(getattr(error, name))
