@@ -8,12 +8,12 @@ import secrets
 import stat
 from contextlib import suppress
 from pathlib import Path
-from typing import Final
+from typing import BinaryIO, Final
 
 from .errors import InvalidCommandError
 from .escaping import escaped, shown
 
-__all__ = ["MAX_BYTES", "name_of", "read_text", "replace_file"]
+__all__ = ["MAX_BYTES", "expect_file", "name_of", "open_file", "read_text", "replace_file"]
 
 MAX_BYTES: Final = 256 * 1024
 """Of a file; no more is ever read. A full one of parameters, records or settings has a tenth of it."""
@@ -33,9 +33,6 @@ def read_text(path: Path, what: str) -> str:
     """
     Read a file of UTF-8, with or without a byte order mark, of at most ``MAX_BYTES``.
 
-    Takes no longer than the disk does: a pipe, a device or a folder is refused, and before it is opened, for opening
-    a serial port may switch what is connected to it.
-
     Args:
         path: Of the file; a link is followed.
         what: What is expected there, for errors: ``listing``.
@@ -44,13 +41,7 @@ def read_text(path: Path, what: str) -> str:
         InvalidCommandError: It is too large, or no text, or *path* can be no name.
         OSError: It cannot be read.
     """
-    try:
-        _expect_file(path, path.stat())
-        descriptor = os.open(path, _HOW_TO_READ)
-    except ValueError:
-        raise InvalidCommandError(f"{shown(str(path))} can be no name of a file") from None
-    with os.fdopen(descriptor, "rb") as file:
-        _expect_file(path, os.fstat(descriptor))  # it may have been replaced since
+    with open_file(path) as file:
         data = file.read(MAX_BYTES + 1)
     if len(data) > MAX_BYTES:
         raise InvalidCommandError(f"{name_of(path)} is larger than any {what}: more than {MAX_BYTES} bytes")
@@ -58,6 +49,31 @@ def read_text(path: Path, what: str) -> str:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InvalidCommandError(f"{name_of(path)} is no {what}: {error}") from error
+
+
+def open_file(path: Path) -> BinaryIO:
+    """
+    Open a plain file to be read; a link is followed.
+
+    Takes no longer than the disk does: a pipe, a device or a folder is refused, and before it is opened, for opening
+    a serial port may switch what is connected to it.
+
+    Raises:
+        InvalidCommandError: *path* can be no name.
+        OSError: It cannot be opened.
+    """
+    try:
+        expect_file(path, path.stat())
+        descriptor = os.open(path, _HOW_TO_READ)
+    except ValueError:
+        raise InvalidCommandError(f"{shown(str(path))} can be no name of a file") from None
+    file = os.fdopen(descriptor, "rb")
+    try:
+        expect_file(path, os.fstat(descriptor))  # it may have been replaced since
+    except BaseException:
+        file.close()
+        raise
+    return file
 
 
 def replace_file(path: Path, text: str) -> None:
@@ -74,7 +90,7 @@ def replace_file(path: Path, text: str) -> None:
     try:
         path = Path(os.path.realpath(path))
         with suppress(FileNotFoundError):
-            _expect_file(path, path.stat())
+            expect_file(path, path.stat())
     except ValueError:
         raise InvalidCommandError(f"{shown(str(path))} can be no name of a file") from None
     new = path.parent / f".{path.name[:32]}.{secrets.token_hex(8)}"
@@ -96,7 +112,8 @@ def replace_file(path: Path, text: str) -> None:
         raise
 
 
-def _expect_file(path: Path, status: os.stat_result) -> None:
+def expect_file(path: Path, status: os.stat_result) -> None:
+    """Raise OSError unless *status*, that of *path*, is of a plain file."""
     if not stat.S_ISREG(status.st_mode):
         if stat.S_ISDIR(status.st_mode):
             raise OSError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))

@@ -108,7 +108,7 @@ class LetGo(Fact):
 class Lost(Fact):
     """The transport has reported its end."""
 
-    why: str | None
+    why: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,7 +163,9 @@ class Noticed(Fact):
     def of(cls, event: Event) -> Noticed:
         """Note *event* by its name and fields."""
         ends_turn = isinstance(event, TurnOver | InStep | MarkerSpent | HoldOver)
-        return cls(type(event).__name__, ends_turn, plain(event) or None)
+        details: dict[str, Any] = plain(event)
+        details.pop("event", None)
+        return cls(type(event).__name__, ends_turn, details or None)
 
 
 LineTap = Callable[[Fact], None]
@@ -203,4 +205,6 @@ def plain(value: Any) -> Any:
         return {str(key): plain(each) for key, each in value.items()}
     if isinstance(value, tuple | list):
         return [plain(each) for each in value]
+    if isinstance(value, frozenset | set):
+        return sorted(plain(each) for each in value)
     return value if value is None or isinstance(value, bool | int | float | str) else str(value)

@@ -151,6 +151,10 @@ class LoopbackTransport(asyncio.Transport):
         """Hang up at once; what the far end has not taken is lost."""
         self._finish(None, ConnectionResetError("the far end hung up"))
 
+    def fail(self, error: Exception) -> None:
+        """Hang up at once, and let the far end be told *error* as what has ended the line."""
+        self._finish(None, error)
+
     def _finish(self, mine: Exception | None, theirs: Exception | None) -> None:
         self._lose(mine)
         self._peer._lose(theirs)  # noqa: SLF001
