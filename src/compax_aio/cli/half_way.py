@@ -68,18 +68,14 @@ class HalfWay:
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        left = self._there.incomplete
         if isinstance(error, RestoreIncompleteError):
             self._tell(error)
             if error.applied or error.uncertain:
                 await self._take_back(error, is_wanted=self._roll_back or await self._is_asked_for())
-        elif isinstance(error, asyncio.CancelledError) and left is not None:
+        elif isinstance(error, asyncio.CancelledError) and (left := self._there.incomplete) is not None:
             self._tell(left)
-            if left.applied or left.uncertain:
-                say_at_end("Interrupted half way; above is what the drive has of it.")
-                await self._take_back(left, is_wanted=self._roll_back)
-            else:
-                say_at_end("Interrupted before anything was written.")
+            is_back = bool(left.applied or left.uncertain) and await self._take_back(left, is_wanted=self._roll_back)
+            say_at_end(f"Interrupted. {'What was written was taken back.' if is_back else left.what}")
 
     def _tell(self, left: RestoreIncompleteError) -> None:
         if not self._printing.json:
@@ -90,17 +86,17 @@ class HalfWay:
             return False
         return await confirm(f"Write back what {self._drive} had before?")
 
-    async def _take_back(self, left: RestoreIncompleteError, *, is_wanted: bool) -> None:
+    async def _take_back(self, left: RestoreIncompleteError, *, is_wanted: bool) -> bool:
+        is_back = False
         try:
             if is_wanted:
                 await self._there.roll_back(left)
-                say_at_end("Interrupted half way; what was written was taken back.")
-                self._printing.note("What was written was taken back, and read back as it was before.")
+                is_back = True
+                self._printing.note(f"What was written was taken back: {self._drive} has what it had before.")
         except CompaxError as error:
             left.add_note(f"it could not be taken back: {error}")
             for note in getattr(error, "__notes__", ()):
                 left.add_note(note)
-            is_wanted = False
-        finally:
-            if self._printing.json:
-                self._printing.show(account_document(left, rolled_back=is_wanted))
+        if self._printing.json:
+            self._printing.show(account_document(left, rolled_back=is_back))
+        return is_back

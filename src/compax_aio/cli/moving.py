@@ -6,7 +6,7 @@ import asyncio
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager, suppress
-from typing import Annotated, Final
+from typing import Annotated, Final, Protocol
 
 from cyclopts import Parameter
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
@@ -16,7 +16,7 @@ from compax_aio import CompaxError, Drive, Move, MoveResult
 from .interruption import in_motion, say_at_end
 from .printing import Printing, notes_console
 
-__all__ = ["MoveView", "TimeoutS", "carry_out", "following", "note_where_from", "stop_interrupted", "written"]
+__all__ = ["MoveView", "TimeoutS", "View", "carry_out", "following", "note_where_from", "stop_interrupted", "written"]
 
 TimeoutS = Annotated[
     float | None,
@@ -131,6 +131,16 @@ async def stop_interrupted(
 # Progress -----------------------------------------------------------------------------------------------------------
 
 
+class View(Protocol):
+    """What shows how an axis is doing."""
+
+    def note_position(self, position: float) -> None:
+        """Take note of where the axis was read to be."""
+
+    def show(self) -> None:
+        """Show how it and its line stand now."""
+
+
 class MoveView:
     """
     What is seen of a move: a bar at a terminal, else a line for each thing that happens to it.
@@ -214,7 +224,7 @@ class MoveView:
 
 
 @asynccontextmanager
-async def following(drive: Drive, view: MoveView) -> AsyncIterator[None]:
+async def following(drive: Drive, view: View) -> AsyncIterator[None]:
     """Read the position again and again for *view*, during a block."""
     follower = asyncio.ensure_future(_follow(drive, view))
     try:
@@ -223,7 +233,7 @@ async def following(drive: Drive, view: MoveView) -> AsyncIterator[None]:
         follower.cancel()
 
 
-async def _follow(drive: Drive, view: MoveView) -> None:
+async def _follow(drive: Drive, view: View) -> None:
     while True:
         with _ended(asyncio.ensure_future(drive.position())) as reading:
             while not reading.done():

@@ -17,6 +17,8 @@ from compax_aio.compax.settings import DriveSettings
 from compax_aio.compax.value_file import read_file
 from compax_aio.compax.value_tables import PARAMETER_TABLE, VARIABLE_TABLE, ValueTable
 
+from .files import reading
+
 __all__ = [
     "PARAMETERS",
     "VARIABLES",
@@ -178,10 +180,10 @@ def values_in_file(path: Path, kind: Kind, settings: DriveSettings) -> dict[int,
     Read a file that `compax params save` has written, and check that a drive can be told all of it.
 
     Raises:
-        InvalidCommandError: It is no such file, or holds something that a drive cannot be told.
-        OSError: It cannot be read.
+        InvalidCommandError: It cannot be read, is no such file, or holds something that a drive cannot be told.
     """
-    values = dict(read_file(path, kind=kind.table.kind, letter=kind.table.letter).values)
+    with reading(path):
+        values = dict(read_file(path, kind=kind.table.kind, letter=kind.table.letter).values)
     for number, value in values.items():
         kind.table.written(number, value, settings.dialect.write_value)
     return values

@@ -217,6 +217,7 @@ class ProgramMemory(ProgramRun):
         clear_rest: bool = False,
         dry_run: bool = False,
         on_progress: Progress | None = None,
+        on_compared: Progress | None = None,
     ) -> Downloaded:
         """
         Check a program, compare it with what is there, and write what differs, each record read back.
@@ -231,6 +232,7 @@ class ProgramMemory(ProgramRun):
             clear_rest: Write END into all records that it does not name.
             dry_run: Only say what would be written.
             on_progress: Called after each record that was written.
+            on_compared: Called after each record that was read before, to be compared.
 
         Raises:
             InvalidCommandError: The listing has errors, all of them in its text; nothing was sent.
@@ -248,7 +250,7 @@ class ProgramMemory(ProgramRun):
         wanted = {**(dict.fromkeys(RECORD_NUMBERS, End()) if clear_rest else {}), **program}
         if not dry_run:
             await self._refuse_while_busy("the program")
-        changes = await self._changes(wanted)
+        changes = await self._changes(wanted, on_compared)
         written: list[WrittenRecord] = []
         if not dry_run:
             await self._write_all(changes, wanted, written, on_progress)
@@ -324,12 +326,14 @@ class ProgramMemory(ProgramRun):
             self._checked_record(number, record if isinstance(source, str) else source[number])
         return program, tuple(each for each in problems if each.severity is not Severity.ERROR)
 
-    async def _changes(self, wanted: Mapping[int, Record]) -> dict[int, tuple[str, str]]:
+    async def _changes(self, wanted: Mapping[int, Record], on_compared: Progress | None) -> dict[int, tuple[str, str]]:
         changes = {}
-        for number, record in sorted(wanted.items()):
+        for done, (number, record) in enumerate(sorted(wanted.items()), start=1):
             old = await self._shown(number)
             if compare(old, record, decimals=self._decimals) is not Shown.SAME:
                 changes[number] = (old, record_text(record))
+            if on_compared is not None:
+                on_compared(done, len(wanted))
         return changes
 
     async def _write(self, number: int, record: Record, on_sent: Callable[[], None] | None = None) -> WrittenRecord:
