@@ -92,5 +92,5 @@ async def _talk(drive: Drive, line: DriveLine, *, may_move: bool, poll_s: float 
         "A stop from software is no emergency stop: have one in hardware, within reach."
     )
     session = Session(drive, prompt, title=line.name or "compax", poll_s=poll_s, may_move=may_move)
-    with patch_stdout():  # what is logged stands above the prompt, too
+    with patch_stdout(raw=True):  # what is logged stands above the prompt, too
         await session.run()

@@ -49,6 +49,8 @@ class Order:
     """Whether it can set the axis in motion, a load that hangs on it included."""
     is_stop: bool = False
     """Whether it waits for nothing."""
+    is_said: bool = True
+    """Whether anything goes over the line, so that it has to wait for its turn."""
 
 
 class Language:
@@ -144,14 +146,14 @@ class Language:
         return answered(line, answer, self._drive.settings) if is_query(line) else self._acknowledged()
 
     async def _start_raw(self, line: str) -> Reply:
-        before = self._underway.raw
-        self._underway.note_raw(line, self._now())
+        before = self._underway.unseen
+        self._underway.note_unseen(line, self._now())
         try:
             await self._drive.command(line)
         except (InvalidCommandError, MoveStoppedError, CommandRejectedError):
-            self._underway.raw = before  # it was not sent, or not taken
+            self._underway.unseen = before  # it was not sent, or not taken
             raise
-        self._underway.note_raw(line, self._now())
+        self._underway.note_unseen(line, self._now())
         return self._acknowledged("it may be moving now, and nobody is told when it is there; `move` tells")
 
     def _acknowledged(self, more: str = "") -> Reply:
@@ -206,7 +208,11 @@ class Language:
 
     async def stop(self) -> Reply:
         """Stop the axis, and say where it stands; raises as ``Drive.stop`` does."""
-        await self._drive.stop()
+        try:
+            await self._drive.stop()
+        except CompaxError:
+            self._underway.note_unseen("what was not stopped", self._now())
+            raise
         self._underway.note_standstill()
         try:
             position: float | None = await self._drive.position()
@@ -294,7 +300,7 @@ class Language:
         async def explain() -> Reply:
             return explained(self.vocabulary, " ".join(words)) if words else overview()
 
-        return Order(text=text, carry_out=explain)
+        return Order(text=text, carry_out=explain, is_said=False)
 
 
 def _number(text: str, what: str) -> float:

@@ -117,7 +117,7 @@ class Script:
 
     async def _tell_what_runs(self) -> None:
         """Say that leaving stops a motion that was started by a raw line, if it still runs."""
-        if self._underway.raw is None:
+        if self._underway.unseen is None:
             return
         at = asyncio.get_running_loop().time()
         self._underway.note_status(await self._drive.status(), at)

@@ -7,6 +7,7 @@ import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from io import StringIO
 from typing import Final
 
@@ -20,7 +21,7 @@ from rich.text import Text
 from ...compax.drive import Drive
 from ...compax.events import ConnectionLost, ConnectionRestored, Fault
 from ...compax.moves import Move
-from ...errors import CompaxError, ConnectionLostError, InvalidCommandError
+from ...errors import CompaxError, ConnectionLostError, InvalidCommandError, MoveInDoubtError
 from .completion import LineCompleter
 from .language import Language, Order
 from .replies import Reply, told_error, told_event, told_move
@@ -34,6 +35,10 @@ __all__ = ["Session"]
 _LEAVE: Final = frozenset({"exit"})
 _YES: Final = frozenset({"y", "yes"})
 _NO: Final = frozenset({"n", "no"})
+_YELLOW: Final = "bold yellow"
+_QUESTION: Final = (
+    "Is everybody clear of it, and the hardware stop within reach? yes sends it, and asks no more in this session."
+)
 _HOW_TO_LEAVE: Final = "nothing runs that was started here; Ctrl-D or exit leaves"
 
 
@@ -62,15 +67,15 @@ class Session:
         self._standing = Standing(is_open=drive.is_open)
         self._turns = Turns(self._replied, self._failed, self._dropped)
         self._watching = Watching(drive, self._tell)
-        self._asked: Order | None = None
+        self._asked: list[Order] = []
         self._stop: asyncio.Task[None] | None = None
-        self._moves: asyncio.TaskGroup
+        self._tasks: asyncio.TaskGroup
 
     async def run(self) -> None:
         """Talk until the person leaves, then stop what was started here."""
         with self._interrupts_heeded():
             async with asyncio.TaskGroup() as tasks:
-                self._moves = tasks
+                self._tasks = tasks
                 background = [
                     tasks.create_task(self._tell_events()),
                     tasks.create_task(self._turns.run()),
@@ -108,44 +113,63 @@ class Session:
         return [("bold", f"{self._title}: move? yes/no> " if self._asked else f"{self._title}> ")]
 
     def _heed(self, text: str) -> bool:
-        """Deal with one line; returns whether there may be more."""
-        asked, self._asked = self._asked, None
-        if asked is not None and text.lower() in _YES:
+        """Deal with what was typed, or with several lines that were pasted; returns whether there may be more."""
+        asked, self._asked = self._asked, []
+        if asked and text.lower() in _YES:
             self._may_move = True
-            self._turns.add(asked)
+            self._take(asked)
             return True
-        if asked is not None:
-            self._dropped(asked, "you did not say yes")
-        if not text or (asked is not None and text.lower() in _NO):
-            return True
+        for order in asked:
+            self._dropped(order, "you did not say yes")
         if text.lower() in _LEAVE:
             return False
-        try:
-            word, *words = text.split()
-            if word.lower() == "watch":
-                self._watching.order(words)
-            else:
-                self._take(self._language.understand(text))
-        except InvalidCommandError as error:
-            self._tell(told_error(error))
-            self._turns.drop("the line typed after it was refused")
+        if not asked or text.lower() not in _NO:
+            self._take_lines([line for line in text.splitlines() if line.strip()])
         return True
 
-    def _take(self, order: Order) -> None:
-        if order.is_stop:
-            self._begin_stop()
-        elif order.can_move and not self._may_move:
-            self._asked = order
+    def _take_lines(self, lines: list[str]) -> None:
+        """Take *lines* if all of them are understood, and if none moves the axis before that is allowed."""
+        orders = []
+        for line in lines:
+            try:
+                orders.append(self._understand(line))
+            except InvalidCommandError as error:
+                self._tell(told_error(error))
+                if len(lines) > 1:
+                    self._tell(Text("nothing of what was pasted was sent", "yellow"))
+                return
+        moving = [order.text for order in orders if order.can_move]
+        if moving and not self._may_move:
+            self._asked = orders
             self._tell(
-                Text.assemble(
-                    (f"{order.text} can move the axis; nothing was sent. ", "bold yellow"),
-                    "Is everybody clear of it, and the hardware stop within reach? "
-                    "yes sends it, and asks no more in this session.",
-                )
+                Text.assemble((f"{', '.join(moving)} can move the axis; nothing was sent. ", _YELLOW), _QUESTION)
             )
         else:
-            self._turns.add(order)
+            self._take(orders)
+
+    def _understand(self, line: str) -> Order:
+        word, *words = line.split()
+        if word.lower() != "watch":
+            return self._language.understand(line)
+        return Order(text=line.strip(), carry_out=partial(self._watching.order, words), is_said=False)
+
+    def _take(self, orders: list[Order]) -> None:
+        for order in orders:
+            if order.is_stop:
+                self._begin_stop()
+            elif order.can_move and not self._drive.is_open:
+                self._dropped(order, "the line to the drive is lost")
+            elif order.is_said:
+                self._turns.add(order)
+            else:
+                self._tasks.create_task(self._carry_out_here(order))
         self._redraw()
+
+    async def _carry_out_here(self, order: Order) -> None:
+        try:
+            self._replied(order, await order.carry_out())
+        except CompaxError as error:
+            self._failed(order, error)
 
     def _bindings(self) -> KeyBindings:
         bindings = KeyBindings()
@@ -166,11 +190,9 @@ class Session:
         if self._underway:
             buffer.reset()
             self._begin_stop()
-        elif buffer.text or self._asked is not None:
+        elif buffer.text or self._asked:
             buffer.reset()
-            if (asked := self._asked) is not None:
-                self._asked = None
-                self._dropped(asked, "you did not say yes")
+            self._drop_asked("you did not say yes")
         elif (given_up := self._turns.give_up()) is not None:
             self._tell(Text(f"{given_up.text}: no longer waited for; it may have been sent", "yellow"))
         elif self._stop is None:
@@ -183,11 +205,16 @@ class Session:
         if reply.people is not None:
             self._tell(reply.people)
         if reply.move is not None:
-            self._moves.create_task(self._follow(reply.move))
+            self._tasks.create_task(self._follow(reply.move))
         self._redraw()
 
     def _failed(self, order: Order, error: CompaxError) -> None:  # noqa: ARG002
         self._tell(told_error(error))
+
+    def _drop_asked(self, why: str) -> None:
+        asked, self._asked = self._asked, []
+        for order in asked:
+            self._dropped(order, why)
 
     def _dropped(self, order: Order, why: str) -> None:
         self._tell(Text(f"not sent: {order.text}; {why}", "yellow"))
@@ -197,21 +224,18 @@ class Session:
         try:
             reply = told_move(await move, self._drive.settings)
         except CompaxError as error:
+            if isinstance(error, MoveInDoubtError):
+                self._underway.note_unseen(move.description, asyncio.get_running_loop().time())
             self._tell(told_error(error))
-        except asyncio.CancelledError:
-            if not move.cancelled():
-                raise
         else:
             self._tell(reply.people or Text())
         self._redraw()
 
     def _begin_stop(self) -> None:
         self._turns.drop("a stop came first")
-        if self._asked is not None:
-            asked, self._asked = self._asked, None
-            self._dropped(asked, "a stop came first")
+        self._drop_asked("a stop came first")
         if self._stop is None:
-            self._stop = self._moves.create_task(self._carry_out_stop())
+            self._stop = self._tasks.create_task(self._carry_out_stop())
             self._stop.add_done_callback(self._stop_done)
             self._redraw()
 
@@ -278,7 +302,6 @@ class Session:
             color_system="standard",
             width=output.get_size().columns,
             highlight=False,
-            soft_wrap=True,
         )
         console.print(text, end="")
         assert isinstance(console.file, StringIO)

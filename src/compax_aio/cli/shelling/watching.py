@@ -13,6 +13,7 @@ from ...compax.drive import Drive
 from ...compax.watch import Watch
 from ...errors import ConnectionLostError, InvalidCommandError
 from .decoding import error_note
+from .replies import Reply
 
 __all__ = ["Watching"]
 
@@ -34,7 +35,7 @@ class Watching:
         self._watch: Watch | None = None
         self._begun = asyncio.Event()
 
-    def order(self, words: Sequence[str]) -> None:
+    async def order(self, words: Sequence[str]) -> Reply:
         """
         Watch the quantities named, in place of those watched before; ``off`` watches nothing.
 
@@ -49,6 +50,7 @@ class Watching:
             self._watch.close()
         self._watch = watch
         self._begun.set()
+        return Reply()
 
     async def run(self) -> None:
         """Tell what changes; until cancelled."""
