@@ -7,6 +7,9 @@ import sys
 
 import pytest
 
+# Imported here, for pytester forgets what is imported for the first time in a run of it.
+from compax_aio.testing import event_loops, faults, stage  # noqa: F401
+
 pytest_plugins = ["pytester"]
 
 OURS = "import sys; print('imported', sorted(name for name in sys.modules if name.startswith('compax_aio')))"
@@ -27,14 +30,14 @@ def name_of_loop():
 
 
 def run(pytester: pytest.Pytester, test: str, *arguments: str, mode: str = "strict") -> pytest.RunResult:
-    """Run a test of a project of its own, in a process of its own, in which warnings are errors."""
+    """Run a test of a project of its own, in which warnings are errors."""
     pytester.makepyfile(application=APPLICATION)
     pytester.makeini(
         "[pytest]\nasyncio_default_fixture_loop_scope = function\nfilterwarnings = error\n"
         f"asyncio_mode = {mode}\npythonpath = .\n"
     )
     pytester.makepyfile("from application import *\n" + test)
-    return pytester.runpytest_subprocess("-p", "no:cacheprovider", *arguments, timeout=60)
+    return pytester.runpytest_inprocess("-p", "no:cacheprovider", *arguments)
 
 
 @pytest.mark.parametrize("mode", ["strict", "auto"])
@@ -242,11 +245,9 @@ def test_without_its_mark_it_says_which(pytester: pytest.Pytester) -> None:
     result.stdout.fnmatch_lines(["*mark it with @pytest.mark.asyncio, or set asyncio_mode = 'auto'*"])
 
 
-def test_an_older_pytest_asyncio_is_told(pytester: pytest.Pytester) -> None:
+def test_an_older_pytest_asyncio_is_told(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
     """One that asks no hook."""
-    pytester.makeconftest(
-        "import pytest_asyncio.plugin\npytest_asyncio.plugin._collect_hook_loop_factories = lambda *_: None\n"
-    )
+    monkeypatch.setattr("pytest_asyncio.plugin._collect_hook_loop_factories", lambda *_: None)
     result = run(pytester, "@pytest.mark.asyncio\nasync def test_it(virtual_time):\n    pass\n")
     result.assert_outcomes(errors=1)
     result.stdout.fnmatch_lines(["*this pytest-asyncio asks nobody; it has to be 1.4 or newer*"])
