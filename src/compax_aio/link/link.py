@@ -23,7 +23,7 @@ from .port import Port
 from .reconnecting import Reconnecting
 from .seldom import Seldom
 from .stats import LinkStats
-from .taps import Asked, Closed, Ended, Fact, LineTap, Lost, Opening, Ready, Refused, tap_of
+from .taps import Asked, Closed, Ended, Fact, LineTap, Lost, Opening, Ready, Refused, Resumed, tap_of
 from .turns import Turns
 from .wire import WireHistory
 
@@ -367,6 +367,7 @@ class Link(asyncio.Protocol):
 
     def resume(self) -> None:
         """Take a person's word that what the line is :attr:`held` for can do no harm, and get in step; else nothing."""
+        self._tell(Resumed())
         self._turns.resume()
 
     def extra_info(self, name: str) -> Any:

@@ -26,6 +26,7 @@ __all__ = [
     "Ready",
     "Received",
     "Refused",
+    "Resumed",
     "Sent",
     "Tap",
     "Way",
@@ -109,6 +110,11 @@ class Lost(Fact):
     """The transport has reported its end."""
 
     why: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Resumed(Fact):
+    """A person says that what the line was held for can do no harm."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,6 +24,7 @@ from ..link.taps import (
     Ready,
     Received,
     Refused,
+    Resumed,
     Sent,
     Way,
 )
@@ -132,6 +133,7 @@ _KINDS: Final[Mapping[str, type[Fact]]] = {
     "received": Received,
     "let go": LetGo,
     "lost": Lost,
+    "resumed": Resumed,
     "closed": Closed,
     "asked": Asked,
     "ended": Ended,

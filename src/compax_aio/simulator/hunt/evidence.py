@@ -14,7 +14,7 @@ from compax_aio.compax.facts.line import XOFF, XON
 from compax_aio.simulator.compax.log import LogEntry, LogKind
 
 from .testimony import Call, Seen, SeenAxis, WireEntry, WireKind
-from .turns import Turns
+from .turns import Turns, Ways
 
 __all__ = ["FORGES_TO_DRIVE", "FORGES_TO_HOST", "Case", "Evidence", "Outage", "Said", "normal"]
 
@@ -157,7 +157,15 @@ class Evidence:
     @cached_property
     def turns(self) -> Turns:
         """The turns of its line."""
-        return Turns(self.axis)
+        calls = self.axis.calls
+        ways = Ways(
+            stop=self.settings.dialect.stop,
+            decimals=self.settings.decimals,
+            answer_timeout_s=self.settings.answer_timeout_s,
+            numbers_follow=self.axis.plan.knobs.comparator_form == "prompt_first",
+            reconciled_at=[call.asked_at for call in calls if call.what == "reconcile"],
+        )
+        return Turns(self.axis.wire, ways)
 
     # The drive --------------------------------------------------------------------------------------------------------
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_left, bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -16,9 +17,9 @@ from compax_aio.compax.facts.line import POSITION_REACHED_SIGN, PROMPT, XOFF, XO
 from compax_aio.compax.facts.status import MARKERS
 from compax_aio.simulator.compax.binary import shown
 
-from .testimony import SeenAxis, WireEntry, WireKind
+from .testimony import WireEntry, WireKind
 
-__all__ = ["Turns", "Written"]
+__all__ = ["LateAnswer", "Turns", "Violation", "Ways", "Written"]
 
 _EPSILON_S: Final = 1e-6
 _NOT_TEXT: Final = bytes({0, XON, XOFF})
@@ -49,7 +50,11 @@ class Written:
     is_acknowledged: bool = False
     """A bare prompt came to it."""
     is_answered: bool = False
-    """An answer that bears its name came to it."""
+    """An answer that bears its name came to it …"""
+    answer: str = ""
+    """… and this is it."""
+    answered_at: float | None = None
+    """When, in its turn or late."""
 
     @property
     def key(self) -> tuple[str, str] | None:
@@ -64,26 +69,64 @@ class Written:
         return key is not None and key[0] == "S" and int(key[1]) in MARKERS
 
 
+@dataclass(frozen=True, slots=True)
+class Violation:
+    """Something that was out of turn."""
+
+    index: int
+    """Its place among all that happened on the wire."""
+    how: str
+
+    def __str__(self) -> str:
+        return self.how
+
+
+@dataclass(frozen=True, slots=True)
+class LateAnswer:
+    """An answer to a line whose time had run out."""
+
+    index: int
+    at: float
+    text: str
+    """Of the line."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ways:
+    """How a drive and its client speak, as far as turns depend on it."""
+
+    stop: str
+    """The word for STOP."""
+    decimals: int
+    answer_timeout_s: float
+    numbers_follow: bool = False
+    """The number of a comparator comes behind a prompt of its own."""
+    reconciled_at: Sequence[float] = ()
+    """When somebody said that half a frame does no harm."""
+    slack_s: float = _EPSILON_S
+    """By so much the times of the wire may be wrong."""
+
+
 class Turns:
     """
     The turns of one line.
 
     Args:
-        axis: What was seen of it.
+        wire: What was written and read on it, and when it was opened.
+        ways: How the two ends speak.
 
     Attributes:
         lines: All that the client wrote, in order.
         violations: What was out of turn.
+        late: Answers that came when nobody waited for them any more.
     """
 
-    def __init__(self, axis: SeenAxis) -> None:
+    def __init__(self, wire: Sequence[WireEntry], ways: Ways) -> None:
         self.lines: list[Written] = []
-        self.violations: list[str] = []
-        self._stop = axis.plan.settings.dialect.stop
-        self._decimals = axis.plan.settings.decimals
-        self._timeout_s = axis.plan.settings.answer_timeout_s
-        self._numbers_follow = axis.plan.knobs.comparator_form == "prompt_first"
-        self._reconciled_at = [call.asked_at for call in axis.calls if call.what == "reconcile"]
+        self.violations: list[Violation] = []
+        self.late: list[LateAnswer] = []
+        self._ways = ways
+        self._index = 0
         self._outstanding: Written | None = None
         self._unanswered: list[Written] = []
         self._in_doubt = True
@@ -94,7 +137,8 @@ class Turns:
         self._answers_to_go = 0
         self._received = bytearray()
         self._changes: list[tuple[int, bool]] = []
-        for index, entry in enumerate(axis.wire):
+        for index, entry in enumerate(wire):
+            self._index = index
             self._take(index, entry)
             self._changes.append((index, self._is_free))
 
@@ -131,17 +175,17 @@ class Turns:
 
     def _write(self, index: int, entry: WireEntry) -> None:
         is_frame = entry.data[:1] >= b"\x80"
-        text = shown(entry.data, self._decimals) if is_frame else entry.data.removesuffix(b"\r").decode("latin-1")
+        text = shown(entry.data, self._ways.decimals) if is_frame else entry.data.removesuffix(b"\r").decode("latin-1")
         if self._outstanding is not None:
             self._give_up(entry, text)
         line = Written(index, entry.at, text, is_frame, self._in_doubt)
-        if self._in_doubt and not (line.is_marker or text == self._stop):
-            self.violations.append(f"{entry.at:.4f}: {text!r} was written while in doubt")
-        if self._cut_frame_at is not None and text != self._stop:
-            if any(at >= self._cut_frame_at for at in self._reconciled_at):
+        if self._in_doubt and not (line.is_marker or text == self._ways.stop):
+            self._violated(f"{entry.at:.4f}: {text!r} was written while in doubt")
+        if self._cut_frame_at is not None and text != self._ways.stop:
+            if any(at >= self._cut_frame_at for at in self._ways.reconciled_at):
                 self._cut_frame_at = None
             else:
-                self.violations.append(f"{entry.at:.4f}: {text!r} was written behind a frame that may be cut")
+                self._violated(f"{entry.at:.4f}: {text!r} was written behind a frame that may be cut")
         if is_frame and _FRAME_OF_MOTION.match(entry.data):
             self._frame = line
         self._outstanding, self._is_sure = line, True
@@ -151,8 +195,8 @@ class Turns:
     def _give_up(self, entry: WireEntry, text: str) -> None:
         before = self._outstanding
         assert before is not None
-        if entry.at - before.at < self._timeout_s - _EPSILON_S:
-            self.violations.append(
+        if entry.at - before.at < self._ways.answer_timeout_s - self._ways.slack_s:
+            self._violated(
                 f"{entry.at:.4f}: {text!r} was written {entry.at - before.at:.4f} s after {before.text!r}, which was "
                 "not answered"
             )
@@ -160,6 +204,9 @@ class Turns:
         if before is self._frame and self._cut_frame_at is None:
             self._cut_frame_at = before.at
             self._answers_to_go = _STOPS_THAT_FILL_A_FRAME
+
+    def _violated(self, how: str) -> None:
+        self.violations.append(Violation(self._index, how))
 
     # Read -----------------------------------------------------------------------------------------------------------
 
@@ -173,12 +220,12 @@ class Turns:
         if text == POSITION_REACHED_SIGN:
             self._read_message(line, at)
         elif len(text) == 1 and text in "12345678":
-            if self._numbers_follow:
+            if self._ways.numbers_follow:
                 self._read_prompt(line, at)
         elif not text:
             self._read_prompt(line, at)
         elif found := _ANSWER.match(text):
-            self._read_answer((found[1], found[2]), at)
+            self._read_answer((found[1], found[2]), text, at)
         else:
             self._read_text(line, at, is_error=_ERROR.search(text) is not None)
 
@@ -232,15 +279,17 @@ class Turns:
         if len(commands) == 1:
             self._settle_up_to(commands[0])
 
-    def _read_answer(self, key: tuple[str, str], at: float) -> None:
+    def _read_answer(self, key: tuple[str, str], text: str, at: float) -> None:
         asked = next((each for each in self._unanswered if each.key == key), None)
         if asked is not None:
             last = self._unanswered[-1]
             # In doubt, the newest of a number is meant only if no older one is unanswered.
             self._settle_up_to(asked)
-            asked.is_answered = True
+            asked.is_answered, asked.answer, asked.answered_at = True, text, at
             if asked is self._outstanding:
                 self._over(asked, at)
+            else:
+                self.late.append(LateAnswer(self._index, at, asked.text))
             if asked is last:
                 self._in_doubt = False
 
