@@ -14,7 +14,7 @@ from typing import Any, Final
 from cyclopts import App, CycloptsError
 
 from ..errors import CompaxError
-from .exit_codes import OK, USAGE, Interrupted, UsageError, exit_code_of
+from .exit_codes import INTERRUPTED, OK, USAGE, Interrupted, UsageError, exit_code_of
 from .interruption import Interruption
 from .printing import Printing, notes_console, tell_error, tell_warning
 
@@ -60,6 +60,8 @@ def _told(
     try:
         code = _carry_out(command, bound, interruption)
         _flush()
+        if code == INTERRUPTED and interruption.signal is not None:  # one that is meant to end so, by whichever signal
+            code = exit_code_of(Interrupted(interruption.signal))
     except KeyboardInterrupt as interrupt:
         if not as_document:
             with suppress(OSError):

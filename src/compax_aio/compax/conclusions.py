@@ -250,14 +250,16 @@ def _state(evidence: Evidence) -> Finding:
     except (KeyError, UnexpectedAnswerError):
         told = f"{_said(evidence, 'S16')}; {_said(evidence, 'S17')}"
         return Finding(topic="state", found="not given", founded=Founded.UNKNOWN, evidence=told)
-    told = [
+    words = [
         _fault(evidence) if not status.no_fault else "no fault",
         *["a warning"] * (not status.no_warning),
         "powered" if status.running else "power stage off",
         "moving" if status.command_active else "standing",
         "machine zero approached" if status.machine_zero_approached else "machine zero not approached",
     ]
-    return Finding(topic="state", found=", ".join(told), founded=Founded.READ, evidence=f"{status.as_sent} (UG p. 209)")
+    return Finding(
+        topic="state", found=", ".join(words), founded=Founded.READ, evidence=f"{status.as_sent} (UG p. 209)"
+    )
 
 
 def _fault(evidence: Evidence) -> str:
