@@ -100,7 +100,8 @@ class MoveEnded(DriveEvent):
         if self.outcome == "reached":
             return Mark("reached", self.target, f"{self.move}, by {self.confirmed_by}")
         why = self.move if self.error is None else self.error.what
-        return Mark(self.outcome, self.target, why if self.was_sent else f"{why} (nothing had been sent)")
+        word = "ended by fault" if self.outcome == "fault" else self.outcome  # the fault has a mark of its own
+        return Mark(word, self.target, why if self.was_sent else f"{why} (nothing had been sent)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,6 +174,12 @@ class EventStream(AsyncIterator[DriveEvent]):
             self.lost += 1
         self._waiting.append(event)
         self._wake.set()
+
+    def take_waiting(self) -> list[DriveEvent]:
+        """Take what has been told and not yet been read, without waiting for more."""
+        events = list(self._waiting)
+        self._waiting.clear()
+        return events
 
     def end(self) -> None:
         """Let the consumer finish when it has read what waits."""
