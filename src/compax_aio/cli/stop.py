@@ -45,7 +45,7 @@ async def stop(
         try:
             await asyncio.wait(tasks.values())
         except asyncio.CancelledError:
-            await _end_all(tasks)
+            await _end_all(tasks, settings.standstill_timeout_s)
             raise
     outcomes = {each: task.result() for each, task in tasks.items()}
     _show(outcomes, printing)
@@ -105,11 +105,13 @@ def _worst(codes: list[int]) -> int:
     return next((code for code in _WORST_FIRST if code in codes), codes[0] if codes else OK)
 
 
-async def _end_all(tasks: dict[str, asyncio.Task[Any]]) -> None:
-    """End stops that are interrupted, each at its standstill if STOP was acknowledged, and say of which it is known."""
-    for task in tasks.values():
-        task.cancel()
-    await asyncio.wait(tasks.values())
+async def _end_all(tasks: dict[str, asyncio.Task[Any]], patience_s: float) -> None:
+    """Let stops that are interrupted come to their end, if they do so soon, and say of which it is known."""
+    _, unfinished = await asyncio.wait(tasks.values(), timeout=patience_s)
+    if unfinished:
+        for task in unfinished:
+            task.cancel()
+        await asyncio.wait(unfinished)
     unknown = [url for url, task in tasks.items() if task.cancelled() or not isinstance(task.result(), StoppedDrive)]
     if unknown:
         say_at_end(f"Interrupted. Whether these stand is not known, look at them: {', '.join(unknown)}")
