@@ -103,7 +103,7 @@ def test_it_wants_a_line(compax: Commands) -> None:
 
 def test_an_interrupted_stop_ends_at_the_standstill(compax: Commands) -> None:
     x = moving(compax, "x", stop_ramp_ms=3000)
-    compax.after(0.2, lambda: signal.raise_signal(signal.SIGINT))
+    compax.after(0.02, lambda: signal.raise_signal(signal.SIGINT))
     outcome = compax("stop", X)
     assert outcome.code == 130
     assert "Interrupted. All drives have acknowledged STOP and stand." in outcome.told
