@@ -7,11 +7,14 @@ from collections import deque
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from pathlib import Path
 from typing import Any, Final, Protocol
 
+from ..checked_numbers import check_number
 from ..errors import InvalidCommandError
 from ..escaping import shown
 from ..motion.events import EventStream
+from .motion_file import is_parquet
 
 __all__ = [
     "QUANTITIES",
@@ -21,6 +24,7 @@ __all__ = [
     "RecordedAxis",
     "RecordedQuantity",
     "axis_of",
+    "check_record",
     "drives_by_axis",
 ]
 
@@ -86,7 +90,47 @@ class RecordedAxis:
     events: EventStream
     is_over: bool = False
     answered_at: deque[float] = field(default_factory=lambda: deque(maxlen=_TIMES_KEPT))
+    samples: int = 0
     newest: dict[str, float] = field(default_factory=dict)
+
+
+def check_record(
+    path: Path,
+    *,
+    quantities: Sequence[str] = QUANTITIES,
+    interval_s: float | None = None,
+    status_interval_s: float | None = None,
+    line_share: float = 1.0,
+) -> None:
+    """
+    Raise what :func:`record` would raise before it looks at its drives.
+
+    Raises:
+        InvalidCommandError: Something of that means nothing, or Parquet is not installed.
+    """
+    _check_quantities(quantities)
+    for what, seconds in (("interval_s", interval_s), ("status_interval_s", status_interval_s)):
+        if seconds is not None and not check_number(what, seconds) > 0:
+            raise InvalidCommandError(f"{what} must be above 0, not {seconds!r}")
+    if not 0 < check_number("line_share", line_share) <= 1:
+        raise InvalidCommandError(f"line_share is above 0 and at most 1, not {line_share!r}")
+    if is_parquet(path):
+        from . import motion_parquet  # noqa: F401, PLC0415 - the library is an extra
+
+
+def _check_quantities(quantities: Sequence[str]) -> None:
+    """Check names of quantities, as far as no drive is needed for that."""
+    possible = f"possible are {', '.join(QUANTITIES)}, S1-S{_HIGHEST_STATUS}"
+    if not quantities:
+        raise InvalidCommandError("no quantity was named, so nothing is recorded", hint=possible)
+    for quantity in quantities:
+        if quantity not in QUANTITIES and _status_number(quantity) is None:
+            raise InvalidCommandError(f"{shown(quantity)} cannot be recorded", hint=possible)
+
+
+def _status_number(quantity: object) -> int | None:
+    found = _STATUS_VALUE.fullmatch(quantity) if isinstance(quantity, str) else None
+    return int(found[1]) if found and int(found[1]) <= _HIGHEST_STATUS else None
 
 
 def axis_of(
@@ -115,21 +159,18 @@ def axis_of(
     return RecordedAxis(name, drive, asked, status, drive.events())
 
 
-def _reader(drive: Recordable, quantity: object) -> tuple[Callable[[], Awaitable[Any]], str]:
+def _reader(drive: Recordable, quantity: str) -> tuple[Callable[[], Awaitable[Any]], str]:
     """Find what asks *drive* for *quantity*, and its unit, as far as it is known before it is asked."""
-    if isinstance(quantity, str):
-        if quantity in QUANTITIES and (read := getattr(drive, quantity, None)) is not None:
-            return read, _UNITS.get(quantity, drive.unit)
-        found = _STATUS_VALUE.fullmatch(quantity)
-        read_status = getattr(drive, "read_status", None)
-        if found and int(found[1]) <= _HIGHEST_STATUS and read_status is not None:
-            return partial(read_status, int(found[1])), ""
-    possible = [name for name in QUANTITIES if hasattr(drive, name)]
-    if hasattr(drive, "read_status"):
-        possible.append(f"S1-S{_HIGHEST_STATUS}")
-    raise InvalidCommandError(
-        f"{quantity!r} cannot be recorded", device=drive.name, hint=f"possible are {', '.join(possible)}"
-    )
+    number = _status_number(quantity)
+    read = getattr(drive, quantity if number is None else "read_status", None)
+    if read is None:
+        possible = ", ".join(name for name in QUANTITIES if hasattr(drive, name))
+        raise InvalidCommandError(
+            f"{quantity!r} cannot be recorded of it", device=drive.name, hint=f"possible are {possible}"
+        )
+    if number is None:
+        return read, _UNITS.get(quantity, drive.unit)
+    return partial(read, number), ""
 
 
 def drives_by_axis(devices: Recordables) -> dict[str, Recordable]:

@@ -14,6 +14,7 @@ import os
 from collections.abc import AsyncIterator, Callable, Coroutine, Mapping, Sequence
 from contextlib import asynccontextmanager
 from datetime import datetime
+from functools import partial
 from math import floor
 from pathlib import Path
 from typing import Any, Final, TypeVar
@@ -24,7 +25,16 @@ from ..escaping import shown
 from ..link.cancellation import despite_cancellation
 from ..motion.events import DriveEvent
 from ..text_file import name_of
-from .motion_asking import QUANTITIES, Recordable, Recordables, RecordedAxis, RecordedQuantity, axis_of, drives_by_axis
+from .motion_asking import (
+    QUANTITIES,
+    Recordable,
+    Recordables,
+    RecordedAxis,
+    RecordedQuantity,
+    axis_of,
+    check_record,
+    drives_by_axis,
+)
 from .motion_file import Kind, RecordFile, Row, csv_path_of, is_parquet
 from .own_thread import OwnThread
 
@@ -73,6 +83,7 @@ class MotionRecording:
         self.samples = 0
         self.missing = 0
         self.error: Exception | None = None
+        self._ended_after_s: float | None = None
         self._loop = asyncio.get_running_loop()
         self._zero_at = self._loop.time()
         self._pause_share = 1 / line_share - 1
@@ -105,9 +116,18 @@ class MotionRecording:
         return self._loop.time() - self._zero_at
 
     @property
+    def ended_after_s(self) -> float:
+        """The time of the record at its end, or now while it goes on."""
+        return self.time_s if self._ended_after_s is None else self._ended_after_s
+
+    @property
     def rows_lost(self) -> int:
         """Rows that could not be written, for the disk was too slow."""
         return self._file.lost
+
+    def samples_of(self, axis: str) -> int:
+        """Return how many values of *axis* were read until now."""
+        return self._axes[axis].samples
 
     def newest(self, axis: str) -> Mapping[str, float]:
         """Return the newest value of each quantity of *axis*; what did not come the last time is not there."""
@@ -213,6 +233,7 @@ class MotionRecording:
         quantity.is_refused = False
         self._put(at, axis.name, Kind.SAMPLE, quantity.name, value=value)
         self.samples += 1
+        axis.samples += 1
         axis.newest[quantity.name] = value
         axis.answered_at.append(at)
         quantity.due_at = _next_beat(at, quantity.interval_s)
@@ -265,7 +286,8 @@ class MotionRecording:
         await asyncio.gather(*self._tasks, return_exceptions=True)
         for axis in self._axes.values():
             self._take_last_events(axis)
-        ended = Row(max(self.time_s, 0.0), "", Kind.RECORD, "ended", self.samples, why)
+        self._ended_after_s = self.time_s
+        ended = Row(self._ended_after_s, "", Kind.RECORD, "ended", self.samples, why)
         try:
             async with asyncio.timeout(_CLOSE_TIMEOUT_S):
                 is_whole = await self._in_thread(self._file.close, ended)
@@ -297,19 +319,6 @@ def _make_parquet(path: Path) -> None:
     source = csv_path_of(path)
     convert(source, path)
     source.unlink()
-
-
-def _need_parquet() -> None:
-    from . import motion_parquet  # noqa: F401, PLC0415 - the library is an extra
-
-
-def _check(path: Path, *, interval_s: float | None, line_share: float, status_interval_s: float | None) -> None:
-    for what, seconds in (("interval_s", interval_s), ("status_interval_s", status_interval_s)):
-        if seconds is not None and not check_number(what, seconds) > 0:
-            raise InvalidCommandError(f"{what} must be above 0, not {seconds!r}")
-    if not 0 < check_number("line_share", line_share) <= 1:
-        raise InvalidCommandError(f"line_share is above 0 and at most 1, not {line_share!r}")
-    is_parquet(path)
 
 
 @asynccontextmanager
@@ -349,11 +358,17 @@ async def record(
         OSError: The file cannot be written; when leaving the block, too.
     """
     path = Path(path)
-    _check(path, interval_s=interval_s, line_share=line_share, status_interval_s=status_interval_s)
-    if is_parquet(path):
-        await asyncio.to_thread(_need_parquet)
-        if path.exists() and not overwrite:
-            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path))
+    check = partial(
+        check_record,
+        path,
+        quantities=quantities,
+        interval_s=interval_s,
+        status_interval_s=status_interval_s,
+        line_share=line_share,
+    )
+    await asyncio.to_thread(check)  # which imports a library
+    if is_parquet(path) and path.exists() and not overwrite:
+        raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path))
     recording = MotionRecording(
         drives_by_axis(devices),
         path,
