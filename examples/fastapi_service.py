@@ -246,17 +246,17 @@ def main(argv: Sequence[str] | None = None) -> int:
     if not all(named):
         parser.error("axes are written as NAME=URL, like x=serial:///dev/ttyUSB0?baudrate=9600")
     urls = {found[1] or f"axis{number}": found[2] for number, found in enumerate(named, start=1) if found}
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # uvicorn hands signals on when all is done
     try:
         asyncio.run(serve(create_app(urls), options.port))
     except compax_aio.CompaxError as error:
         print(f"{type(error).__name__}: {error}", file=sys.stderr)
         return 1
-    except KeyboardInterrupt:
+    except KeyboardInterrupt:  # uvicorn hands signals on when all is done
         pass
     print("terminated; the axes were stopped and their lines closed")
     return 0
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     sys.exit(main())

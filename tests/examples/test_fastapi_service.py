@@ -8,7 +8,7 @@ import json
 import signal
 import socket
 import sys
-from collections.abc import AsyncIterator, Iterator, MutableMapping
+from collections.abc import AsyncIterator, MutableMapping
 from contextlib import asynccontextmanager
 from pathlib import Path
 from types import ModuleType
@@ -242,15 +242,6 @@ def test_an_axis_is_written_as_name_and_url(capsys: pytest.CaptureFixture[str]) 
     assert "axes are written as NAME=URL" in capsys.readouterr().err
 
 
-@pytest.fixture
-def signals_as_they_were() -> Iterator[None]:
-    """Put back what main() does to SIGTERM."""
-    before = signal.getsignal(signal.SIGTERM)
-    yield
-    signal.signal(signal.SIGTERM, before)
-
-
-@pytest.mark.usefixtures("signals_as_they_were")
 def test_a_port_that_is_taken_is_told(capsys: pytest.CaptureFixture[str]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
