@@ -10,7 +10,7 @@ from prompt_toolkit.completion import CompleteEvent, Completer, Completion
 from prompt_toolkit.document import Document
 
 from .entries import Entry, Kind
-from .vocabulary import Vocabulary
+from .vocabulary import Vocabulary, subsequence
 from .words import WORDS
 
 __all__ = ["LineCompleter"]
@@ -79,8 +79,10 @@ def _named(rows: Iterable[tuple[str, str]], typed: str) -> Iterator[Completion]:
 
 def _name(entry: Entry, typed: str) -> str:
     """Return the form of the word that was begun: long for who types POS, short for who types PA."""
-    begun = (each for each in (entry.word, *entry.aliases) if each.upper().startswith(typed.upper()))
-    return next(begun, entry.word)
+    names, upper = (entry.word, *entry.aliases), typed.upper()
+    begun = [each for each in names if each.upper().startswith(upper)]
+    meant = [each for each in names if subsequence(upper, each.upper())]
+    return next(iter((*begun, *meant, entry.word)))
 
 
 def _completion(name: str, typed: str, meaning: str) -> Completion:

@@ -106,7 +106,7 @@ def _parameter(number: int, answer: str, settings: DriveSettings) -> tuple[Mappi
         errors_suppressed_weight=settings.errors_suppressed_weight,
     )
     flags = {name: getattr(said, name) for name in ("xonxoff", "errors_suppressed", "binary")}
-    text = Text(", ".join(name for name, is_set in flags.items() if is_set) or "neither of what is known is on", "cyan")
+    text = Text(", ".join(name for name, is_set in flags.items() if is_set) or "nothing that is known is on", "cyan")
     if said.unknown:
         text.append(f"; weights of unknown meaning: {said.unknown}", "yellow")
     return {**known, **flags}, text

@@ -40,7 +40,7 @@ class Underway:
 
     def note_status(self, status: DriveStatus, at: float) -> None:
         """Take note of a status that was read from loop time *at* on: it may show that what was unseen is over."""
-        if at > self._unseen_since and not status.command_active and not status.program_running:
+        if at >= self._unseen_since and not status.command_active and not status.program_running:
             self.unseen = None
 
     def note_standstill(self) -> None:

@@ -16,7 +16,7 @@ from .entries import Entry, Kind, drive_entries, error_entry, parameter_entry, r
 __all__ = ["Vocabulary", "subsequence"]
 
 _NUMBERED: Final = re.compile(r"([SPVNE])0*([1-9][0-9]{0,2})")
-_AFTER_A_NAME: Final = frozenset("-+.=$0123456789")
+_AFTER_A_NAME: Final = frozenset("-+.=:$0123456789")
 _LEAST_LETTERS: Final = 3
 """Of a word that is looked for in meanings: fewer are in nearly all of them."""
 
