@@ -20,7 +20,7 @@ from .facts.settings import DIALECT_FACTS, SETTING_FACTS, SettingFact
 from .settings import AxisUnit, Dialect, DriveSettings
 from .value_file import read_toml
 
-__all__ = ["read_settings", "settings_text", "write_settings"]
+__all__ = ["read_settings", "settings_from", "settings_text", "write_settings"]
 
 _Table = TypeVar("_Table", DriveSettings, Dialect, AxisUnit)
 
@@ -56,6 +56,16 @@ def read_settings(path: str | Path) -> DriveSettings:
         return _table(DriveSettings, content, "")
     except InvalidCommandError as error:
         raise InvalidCommandError(f"{name_of(Path(path))}: {error.what}", hint=error.hint) from error
+
+
+def settings_from(table: Mapping[str, Any]) -> DriveSettings:
+    """
+    Make settings of a table that was read, of TOML or JSON; what it does not say has its default.
+
+    Raises:
+        InvalidCommandError: It has a key that is no setting, or a value that cannot be meant; says which.
+    """
+    return _table(DriveSettings, dict(table), "")
 
 
 def _table(kind: type[_Table], content: object, where: str) -> _Table:

@@ -288,7 +288,7 @@ class Turns:
             asked.is_answered, asked.answer, asked.answered_at = True, text, at
             if asked is self._outstanding:
                 self._over(asked, at)
-            else:
+            elif asked.over_at is None:  # else something unreadable came first
                 self.late.append(LateAnswer(self._index, at, asked.text))
             if asked is last:
                 self._in_doubt = False

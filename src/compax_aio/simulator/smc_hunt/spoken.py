@@ -60,8 +60,11 @@ class Spoken:
     wire: list[WireEntry]
     settings: SmcSettings
     mode: str
+    slack_s: float = _SLACK_S
+    """By so much the times of the wire may be wrong."""
     lines: list[SpokenLine] = field(default_factory=list)
-    wrongs: list[str] = field(default_factory=list)
+    wrong_at: list[tuple[int, str]] = field(default_factory=list)
+    """What was out of turn, each with its place among all that happened."""
     preempts: list[int] = field(default_factory=list)
     """Indexes of ESC and ^C."""
     _last: int | None = None
@@ -81,11 +84,16 @@ class Spoken:
             if entry.kind in {WireKind.OPENED, WireKind.LOST, WireKind.CLOSED}:
                 self._last = self._line = None
             elif entry.kind is WireKind.READ:
-                if entry.at <= self._last_at + self._patience_s() + _SLACK_S:  # else nobody waited for it any more
+                if entry.at <= self._last_at + self._patience_s() + self.slack_s:  # else nobody waited for it any more
                     self._heard += entry.data
                 self._has_heard = True
             elif entry.kind is WireKind.WRITTEN:
                 self._written(index, entry)
+
+    @property
+    def wrongs(self) -> list[str]:
+        """What was out of turn."""
+        return [how for _, how in self.wrong_at]
 
     def between(self, first: int, end: int) -> Iterator[SpokenLine]:
         """List the lines that were begun there."""
@@ -97,7 +105,7 @@ class Spoken:
 
     def _written(self, index: int, entry: WireEntry) -> None:
         if len(entry.data) != 1:
-            self.wrongs.append(f"{entry}: more than one character at a time")
+            self.wrong_at.append((index, f"{entry}: more than one character at a time"))
         for byte in entry.data:
             self._take(index, entry.at, byte)
         self._heard.clear()
@@ -106,12 +114,12 @@ class Spoken:
     def _take(self, index: int, at: float, byte: int) -> None:
         was_echoed = self._was_echoed()
         # An echo that comes as its time runs out may be too late, or not.
-        came_late = abs(at - self._last_at - self._patience_s()) < _SLACK_S
+        came_late = abs(at - self._last_at - self._patience_s()) < self.slack_s
         # A name that a ring has dealt comes back as another one, and so does one that was damaged.
         is_dealt = self.mode == "daisy" and not was_echoed and self._has_heard and byte == _LF
         clears = self._clears(byte, was_echoed=was_echoed)
         if byte not in _PREEMPTS and (why := self._too_early(at, was_echoed=was_echoed, clears=clears)):
-            self.wrongs.append(f"at {at:.4f} s {chr(byte)!r} although {why}")
+            self.wrong_at.append((index, f"at {at:.4f} s {chr(byte)!r} although {why}"))
         if byte in _PREEMPTS:
             self.preempts.append(index)
         if clears or byte in _PREEMPTS or byte == self._end:
@@ -152,7 +160,7 @@ class Spoken:
     def _too_early(self, at: float, *, was_echoed: bool, clears: bool) -> str | None:
         if self._last is None:
             return None
-        waited_s = at - self._last_at + _SLACK_S
+        waited_s = at - self._last_at + self.slack_s
         if self._is_ambiguous:
             return None
         last = chr(self._last)
