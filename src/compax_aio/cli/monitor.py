@@ -16,7 +16,7 @@ from .opening import DriveLine
 from .printing import notes_console
 
 if TYPE_CHECKING:
-    from .monitoring.axis import Farewell
+    from .monitoring.orders import Farewell
 
 __all__ = ["monitor"]
 

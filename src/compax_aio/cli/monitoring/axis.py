@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Coroutine
+from collections.abc import Coroutine
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Final
 
 import compax_aio
-from compax_aio import Drive, DriveSettings, Move
+from compax_aio import Drive, DriveSettings
 from compax_aio.compax.events import (
     ComparatorPassed,
     ConnectionLost,
@@ -22,14 +22,15 @@ from compax_aio.compax.events import (
 )
 from compax_aio.compax.facts.limits import MAX_POSITION
 from compax_aio.compax.vocabulary import plan_home
-from compax_aio.errors import CompaxError, ConnectionLostError, MoveInDoubtError, MoveTimeoutError
+from compax_aio.errors import CompaxError, ConnectionLostError, MoveInDoubtError
 
 from .diary import Diary
 from .levels import Level
-from .state import DETAILS, ESSENTIALS, AxisState, Phase, StopReport
+from .orders import Farewell, Orders
+from .state import DETAILS, ESSENTIALS, AxisState, Phase
 from .words import by_keys
 
-__all__ = ["Farewell", "MonitoredAxis"]
+__all__ = ["MonitoredAxis"]
 
 _FIRST_PAUSE_S: Final = 1.0
 _LONGEST_PAUSE_S: Final = 10.0
@@ -40,20 +41,13 @@ _SAME_TEXT_S: Final = 5.0
 _ANY_MOTION: Final = "a motion"
 
 
-@dataclass(frozen=True, slots=True)
-class Farewell:
-    """What became of one axis when the monitor was left."""
-
-    axis: str
-    text: str
-    """Empty where nothing of it was started here, and it stands as far as is known."""
-    error: BaseException | None = None
-    """Why nobody can say that it stands, although it was started here."""
-
-
 class MonitoredAxis:
     """
     One axis, on a line of its own; nothing that happens on it reaches another one.
+
+    Attributes:
+        state: What is known of it.
+        orders: What may be asked of it.
 
     Args:
         name: Of the axis.
@@ -68,30 +62,21 @@ class MonitoredAxis:
         self, name: str, url: str, settings: DriveSettings, *, interval_s: float, jog_percent: float, diary: Diary
     ) -> None:
         self.state = AxisState(name, url, interval_s, unit=settings.unit, decimals=settings.decimals)
+        self.orders = Orders(self.state, diary, jog_percent)
         self._settings = settings
-        self._jog_percent = jog_percent
         self._diary = diary
-        self._drive: Drive | None = None
-        self._move: Move | None = None
         self._run: asyncio.Task[None] | None = None
-        self._stopping: asyncio.Task[None] | None = None
         self._tasks: set[asyncio.Task[Any]] = set()
         self._again = asyncio.Event()
         self._openings = 0
         self._error_was_asked = False
         self._strays_untold = 0
         self._stray_told_at = float("-inf")
-        self._may_have_left_moving = False
 
     @property
     def name(self) -> str:
         """What the axis is called."""
         return self.state.name
-
-    @property
-    def is_moved_from_here(self) -> bool:
-        """Whether a motion was started here that is not known to be over."""
-        return self._move is not None or self._may_have_left_moving
 
     def _now(self) -> float:
         return asyncio.get_running_loop().time()
@@ -123,8 +108,8 @@ class MonitoredAxis:
     async def _follow_for_ever(self) -> None:
         try:
             while True:
-                self._drive = await self._connected()
-                await self._follow(self._drive)
+                self.orders.drive = await self._connected()
+                await self._follow(self.orders.drive)
                 await self._await_word()
         except Exception as defect:
             self.state.enter(Phase.ENDED, self._now(), f"{type(defect).__name__}: {defect}")
@@ -173,11 +158,11 @@ class MonitoredAxis:
 
     async def _await_word(self) -> None:
         """Wait until somebody wants a line that was lost for good to be opened anew."""
-        assert self._drive is not None
+        assert self.orders.drive is not None
         self.state.enter(Phase.ENDED, self._now(), self.state.trouble)
         self._again.clear()
         await self._again.wait()
-        drive, self._drive = self._drive, None
+        drive, self.orders.drive = self.orders.drive, None
         await drive.close()
 
     # What it says ---------------------------------------------------------------------------------------------------
@@ -199,11 +184,11 @@ class MonitoredAxis:
 
     def look(self) -> None:
         """Take down what can be known without a word from the drive; to be called before it is shown."""
-        if self._drive is None:
+        if self.orders.drive is None:
             return
-        self.state.doubt = _doubt_of(self._drive)
+        self.state.doubt = _doubt_of(self.orders.drive)
         if self.state.phase is Phase.LOST:
-            self.state.attempts = self._drive.stats.openings - self._openings
+            self.state.attempts = self.orders.drive.stats.openings - self._openings
 
     def _ask_for_error(self, drive: Drive, *, nothing_to_ask: bool) -> None:
         """Ask a drive once which fault or warning it has; a fault that was there before us is no event."""
@@ -240,8 +225,8 @@ class MonitoredAxis:
             state.error, self._error_was_asked = event.error, True
             self._tell(f"fault {event.error}" if event.error else "a fault; it does not say which", Level.ALARM)
         elif isinstance(event, ConnectionLost):
-            if state.phase is Phase.OPEN and self._drive is not None:
-                self._openings = self._drive.stats.openings
+            if state.phase is Phase.OPEN and self.orders.drive is not None:
+                self._openings = self.orders.drive.stats.openings
                 state.attempts = 0
             reason = event.reason.removeprefix(f"{self.name}: ")
             state.enter(Phase.LOST, self._now(), reason.partition(";")[0])
@@ -268,161 +253,18 @@ class MonitoredAxis:
             self._tell(f"unexpected text {event.text[:60]!r}{before}", Level.ATTENTION)
             self._strays_untold, self._stray_told_at = 0, self._now()
 
-    # What is asked of it: moving ------------------------------------------------------------------------------------
-
-    def jog(self, distance: float) -> None:
-        """Move by *distance*, if nothing moves that was started here."""
-        what = f"jog {distance:+g} {self.state.unit}"
-        self._begin(what, lambda drive: drive.move_by(distance, speed_percent=self._jog_percent))
-
-    def home(self) -> None:
-        """Find machine zero, if nothing moves that was started here."""
-        self._begin("search for machine zero", lambda drive: drive.home())
-
-    def _begin(self, what: str, start: Callable[[Drive], Move]) -> None:
-        drive = self._drive
-        if drive is None or not drive.is_open:
-            self._tell(f"{what}: nothing was sent, there is no line", Level.ATTENTION)
-        elif self._stopping is not None:
-            self._tell(f"{what}: nothing was sent, a stop is under way", Level.ATTENTION)
-        elif self._move is not None:
-            self._tell(f"{what}: nothing was sent, {self.state.own_motion} is not over", Level.ATTENTION)
-        else:
-            try:
-                move = start(drive)
-            except CompaxError as error:
-                self._tell(f"{what}: {error}", Level.ATTENTION)
-                return
-            self._move, self.state.own_motion = move, what
-            self._tell(f"{what}: begun here", Level.ACTIVE)
-            self._spawn(self._see_to_its_end(move, what))
-
-    async def _see_to_its_end(self, move: Move, what: str) -> None:
-        try:
-            await asyncio.wait([move])
-        finally:
-            self._move = self.state.own_motion = None
-            self.state.own_ended_at = self._now()
-        error = None if move.cancelled() else move.exception()
-        if error is not None:
-            self._may_have_left_moving |= isinstance(error, MoveInDoubtError)
-            why = str(error).removeprefix(f"{self.name}: ")
-            self._tell(f"{what}: {why}", Level.ALARM if isinstance(error, MoveInDoubtError) else Level.ATTENTION)
-        elif not move.cancelled():
-            result = move.result()
-            where = "" if result.target is None else f" {result.target:.{self.state.decimals}f} {self.state.unit}"
-            self._tell(f"{what}: reached{where}, confirmed by {result.confirmed_by}", Level.ACTIVE)
-
-    # What is asked of it: stopping ----------------------------------------------------------------------------------
-
-    def stop(self) -> None:
-        """Stop the drive ahead of everything else; what comes of it stands in the state and the diary."""
-        if self._stopping is not None:
-            return  # it is repeated until it is acknowledged
-        if self._drive is None:
-            text = "STOP was not sent, there is no line: use the emergency stop if it moves"
-            self._report_stop(Level.ALARM, text)
-            return
-        self.state.stop = StopReport(self._now(), Level.WAITING, "STOP sent, waiting for the drive")
-        self._stopping = self._spawn(self._carry_stop_through(self._drive))
-
-    async def _carry_stop_through(self, drive: Drive) -> None:
-        try:
-            await drive.stop()
-        except MoveTimeoutError as error:
-            self._may_have_left_moving = True
-            self._report_stop(Level.ALARM, f"ACKNOWLEDGED, BUT STILL ACTIVE: use the emergency stop ({error.what})")
-        except CompaxError as error:
-            self._may_have_left_moving = True
-            self._report_stop(Level.ALARM, f"NOT ACKNOWLEDGED: use the emergency stop ({_why(error)})")
-        else:
-            self._may_have_left_moving = False
-            self._report_stop(Level.QUIET, "acknowledged, and the axis stands")
-        finally:
-            self._stopping = None
-            if self.state.stop is not None and self.state.stop.level is Level.WAITING:  # a defect, or the end
-                self.state.stop = replace(self.state.stop, level=Level.ALARM, text="not known: look at the machine")
-
-    def _report_stop(self, level: Level, text: str) -> None:
-        self.state.stop = StopReport(self._now(), level, text)
-        self._tell(f"stop: {text}", level)
-
-    # What is asked of it: the rest ----------------------------------------------------------------------------------
-
-    def acknowledge(self) -> None:
-        """Acknowledge the error (QUIT), unless the drive says that there is none."""
-        status = self.state.status(self._now())
-        if status is not None and status.no_fault and status.no_warning:
-            self._tell("there is no error to acknowledge; nothing was sent")
-        else:
-            self._ask("acknowledging the error", self._acknowledge)
-
-    async def _acknowledge(self, drive: Drive) -> None:
-        await drive.quit()
-        self._error_was_asked, self.state.error = False, None
-        self._tell("QUIT was taken; whether the error is gone, its status says", Level.ACTIVE)
-
-    def reconcile(self) -> None:
-        """Read how a drive stands of which something was in doubt, and let it take motion again."""
-        self._ask("reconciling", self._reconcile)
-
-    async def _reconcile(self, drive: Drive) -> None:
-        status = await drive.reconcile()
-        self._may_have_left_moving &= status.command_active or status.program_running
-        moves = "its command is active" if status.command_active else "no command is active"
-        self._tell(f"reconciled: {moves} ({status.as_sent}); it takes motion again", Level.ACTIVE)
-
-    def _ask(self, what: str, ask: Callable[[Drive], Coroutine[Any, Any, None]]) -> None:
-        if self._drive is None:
-            self._tell(f"{what}: nothing was sent, there is no line", Level.ATTENTION)
-        else:
-            self._spawn(self._asked(what, ask(self._drive)))
-
-    async def _asked(self, what: str, asking: Coroutine[Any, Any, None]) -> None:
-        try:
-            await asking
-        except CompaxError as error:
-            self._tell(f"{what} failed: {error}", Level.ATTENTION)
-
     # The end --------------------------------------------------------------------------------------------------------
 
     async def close(self) -> Farewell:
         """Stop what was started here, close the line, and say what became of the axis."""
-        move, what, moves_otherwise = self._move, self.state.own_motion, self.state.is_seen_moving(self._now())
-        was_in_doubt = self._may_have_left_moving
         if self._run is not None:
             self._run.cancel()
             await asyncio.wait([self._run])
-        error: BaseException | None = None
-        if self._drive is not None:
-            try:
-                await self._drive.close()
-            except CompaxError as failure:
-                error = failure
+        farewell = await self.orders.close()
         if self._tasks:
             await asyncio.wait(self._tasks)
         self.state.enter(Phase.ENDED, self._now(), "the monitor was left")
-        if move is not None and not move.cancelled():
-            ended = move.exception()
-            error = error or (ended if isinstance(ended, MoveInDoubtError) else None)
-        if error is not None:
-            return Farewell(self.name, f"NOT KNOWN TO STAND, use the emergency stop if it moves: {error}", error)
-        if move is not None:
-            return Farewell(self.name, _how_it_ended(move, what or ""))
-        if was_in_doubt:
-            return Farewell(self.name, "something started here was in doubt: stopped, and it stands")
-        return Farewell(self.name, "moves, but was not started here: left alone" if moves_otherwise else "")
-
-
-def _how_it_ended(move: Move, what: str) -> str:
-    error = None if move.cancelled() else move.exception()
-    if error is None:
-        return f"{what} was under way: it has reached its target" if not move.cancelled() else f"{what}: given up"
-    return f"{what} was under way: {getattr(error, 'what', error)}"
-
-
-def _why(error: CompaxError) -> str:
-    return error.what.removeprefix("STOP was not acknowledged: ")
+        return farewell
 
 
 def _doubt_of(drive: Drive) -> str | None:

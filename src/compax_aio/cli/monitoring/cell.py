@@ -7,9 +7,10 @@ from collections.abc import Sequence
 
 from compax_aio.link.cancellation import despite_cancellation
 
-from .axis import Farewell, MonitoredAxis
+from .axis import MonitoredAxis
 from .diary import Diary
 from .levels import Level
+from .orders import Farewell
 from .state import StopReport
 from .wanted import WantedAxis
 
@@ -46,7 +47,7 @@ class Cell:
         """Stop all axes; STOP goes to all lines in the next turn of the event loop."""
         self.diary.add("", "STOP ALL", Level.ACTIVE)
         for axis in self.axes:
-            axis.stop()
+            axis.orders.stop()
 
     @property
     def stops(self) -> dict[str, StopReport]:
@@ -55,8 +56,8 @@ class Cell:
 
     @property
     def moved_from_here(self) -> tuple[MonitoredAxis, ...]:
-        """The axes on which something was started here that is not known to be over."""
-        return tuple(axis for axis in self.axes if axis.is_moved_from_here)
+        """The axes of which it is not known that all is over that was started here."""
+        return tuple(axis for axis in self.axes if axis.orders.may_move_by_us)
 
     async def close(self) -> None:
         """

@@ -14,21 +14,29 @@ from textual.widgets import Digits, Static
 from . import drawing
 from .state import AxisState
 
-__all__ = ["AxisPanel"]
+__all__ = ["AxisPanel", "Drawn"]
 
 
-class _Drawn(Static):
-    """A piece of text that is drawn anew only when it says something else."""
+class Drawn(Static):
+    """
+    A piece of text that is drawn anew only when it says something else.
 
-    def __init__(self, *, classes: str) -> None:
-        super().__init__(classes=classes, markup=False)
+    Args:
+        id: Of the widget, for its style.
+        classes: Of the widget, for its style.
+        is_as_high_as_its_text: Lay the screen out anew when the text changes; else it has a height of its own.
+    """
+
+    def __init__(self, *, id: str | None = None, classes: str = "", is_as_high_as_its_text: bool = False) -> None:  # noqa: A002
+        super().__init__(id=id, classes=classes, markup=False)
         self._shown: Text | None = None
+        self._lays_out = is_as_high_as_its_text
 
     def show(self, text: Text) -> None:
         """Let it be *text*."""
         if self._shown is None or text != self._shown or text.spans != self._shown.spans:
             self._shown = text
-            self.update(text)
+            self.update(text, layout=self._lays_out)
 
 
 class AxisPanel(Vertical):
@@ -65,14 +73,14 @@ class AxisPanel(Vertical):
         super().__init__()
         self._axis = axis
         self._choose = choose
-        self._title = _Drawn(classes="title")
+        self._title = Drawn(classes="title")
         self._digits = Digits()
-        self._place = _Drawn(classes="place")
-        self._facts = _Drawn(classes="facts")
-        self._trends = _Drawn(classes="trends")
-        self._bar = _Drawn(classes="bar")
-        self._compact = _Drawn(classes="compact")
-        self._lamps = _Drawn(classes="lamps")
+        self._place = Drawn(classes="place")
+        self._facts = Drawn(classes="facts")
+        self._trends = Drawn(classes="trends")
+        self._bar = Drawn(classes="bar")
+        self._compact = Drawn(classes="compact")
+        self._lamps = Drawn(classes="lamps")
 
     def compose(self) -> ComposeResult:
         """Lay out its parts."""

@@ -12,7 +12,7 @@ from textual.app import App, ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import VerticalScroll
 from textual.screen import ModalScreen
-from textual.widgets import RichLog, Static
+from textual.widgets import RichLog
 
 from .axis import MonitoredAxis
 from .cell import Cell
@@ -20,7 +20,7 @@ from .dialogs import Help, Leaving, Question
 from .diary import Entry
 from .drawing import COLOURS, between
 from .levels import Level
-from .panel import AxisPanel
+from .panel import AxisPanel, Drawn
 from .steps import LARGE, next_step
 
 __all__ = ["Monitor"]
@@ -58,13 +58,13 @@ class Monitor(App[bool]):
     CSS = """
     Screen { background: #0d1117; layout: vertical; }
     ModalScreen { background: #000000 60%; }
-    #head { height: 1; background: #34465c; color: #f2f6fa; }
+    #head { dock: top; height: 1; background: #34465c; color: #f2f6fa; }
     #head.motion { background: #e8b130; color: #0d1117; }
     #axes { height: auto; max-height: 1fr; background: #0d1117; scrollbar-size-vertical: 1; }
     #stops { height: auto; max-height: 40%; background: #161d27; display: none; padding: 0 1; }
     #stops.shown { display: block; }
     #log { height: 1fr; min-height: 3; background: #0d1117; padding: 0 1; scrollbar-size-vertical: 1; }
-    #keys { height: auto; background: #222c39; padding: 0 1; }
+    #keys { dock: bottom; height: auto; background: #222c39; padding: 0 1; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
         # With priority: also while a dialog is open.
@@ -104,20 +104,21 @@ class Monitor(App[bool]):
         ]
         self._is_small = True
         self._told = 0
+        self._log_width = 0
         self._leaving: asyncio.Task[None] | None = None
 
     # What is seen ---------------------------------------------------------------------------------------------------
 
     def compose(self) -> ComposeResult:
         """Lay out the screen."""
-        yield Static(id="head", markup=False)
+        yield Drawn(id="head")
         with VerticalScroll(id="axes", can_focus=False):
             yield from self._panels
-        yield Static(id="stops", markup=False)
+        yield Drawn(id="stops", is_as_high_as_its_text=True)
         log = RichLog(id="log", max_lines=1000, wrap=True, markup=False, highlight=False)
         log.can_focus = False
         yield log
-        yield Static(id="keys", markup=False)
+        yield Drawn(id="keys", is_as_high_as_its_text=True)
 
     def on_mount(self) -> None:
         """Begin to watch; nothing is sent that could move an axis."""
@@ -141,20 +142,20 @@ class Monitor(App[bool]):
             axis.look()
             panel.show(now, is_selected=number == self.chosen, is_small=self._is_small)
         base = self.screen_stack[0]
-        self._show_head(base.query_one("#head", Static))
-        self._show_stops(base.query_one("#stops", Static), now)
-        base.query_one("#keys", Static).update(self._keys())
+        self._show_head(base.query_one("#head", Drawn))
+        self._show_stops(base.query_one("#stops", Drawn), now)
+        base.query_one("#keys", Drawn).show(self._keys())
         self._show_diary(base.query_one("#log", RichLog))
 
-    def _show_head(self, head: Static) -> None:
+    def _show_head(self, head: Drawn) -> None:
         head.set_class(self.is_motion_on, "motion")
         unit = self._axis.state.unit
         motion = f"MOTION ON: ← → jog {self.step:g} {unit}, h homes; m off" if self.is_motion_on else _LOOKING
         number = len(self._panels)
         left = Text.assemble((" compax monitor ", "bold"), f" {number} {'axis' if number == 1 else 'axes'}")
-        head.update(between(left, Text(f"{motion} ", "bold" if self.is_motion_on else ""), head.size.width))
+        head.show(between(left, Text(f"{motion} ", "bold" if self.is_motion_on else ""), head.size.width))
 
-    def _show_stops(self, place: Static, now: float) -> None:
+    def _show_stops(self, place: Drawn, now: float) -> None:
         stops = self.cell.stops
         shown = any(stop.level is not Level.QUIET or now - stop.at < _STOP_SHOWN_S for stop in stops.values())
         place.set_class(shown, "shown")
@@ -168,12 +169,17 @@ class Monitor(App[bool]):
                 for name, stop in stops.items()
                 if stop.level is not Level.QUIET or now - stop.at < _STOP_SHOWN_S
             ]
-            place.update(Text("\n").join(lines))
+            place.show(Text("\n").join(lines))
 
     def _show_diary(self, log: RichLog) -> None:
-        for entry in self.cell.diary.since(self._told):
-            log.write(_line(entry))
-        self._told = self.cell.diary.written
+        width = log.scrollable_content_region.width
+        if width != self._log_width:
+            log.clear()
+            self._told, self._log_width = 0, width
+        if width > 0:  # it has been laid out
+            for entry in self.cell.diary.since(self._told):
+                log.write(_line(entry), width=width)
+            self._told = self.cell.diary.written
 
     def _keys(self) -> Text:
         keys = [("s", "stop"), ("↑↓", "axis"), ("m", "motion off" if self.is_motion_on else "motion on")]
@@ -224,7 +230,7 @@ class Monitor(App[bool]):
     def action_stop(self) -> None:
         """Stop the axis that is chosen."""
         self.cell.diary.add(self._axis.name, "stop", Level.ACTIVE)
-        self._axis.stop()
+        self._axis.orders.stop()
         self.show()
 
     # Moving ---------------------------------------------------------------------------------------------------------
@@ -256,7 +262,7 @@ class Monitor(App[bool]):
     def action_jog(self, steps: int) -> None:
         """Move the chosen axis by so many steps."""
         if self._may_move("jog"):
-            self._axis.jog(steps * self.step)
+            self._axis.orders.jog(steps * self.step)
             self.show()
 
     def action_step(self, direction: int) -> None:
@@ -273,13 +279,13 @@ class Monitor(App[bool]):
 
     def _home(self, axis: MonitoredAxis) -> None:
         if self.is_motion_on:
-            axis.home()
+            axis.orders.home()
 
     # What else is asked of a drive ----------------------------------------------------------------------------------
 
     def action_acknowledge(self) -> None:
         """Acknowledge the error of the chosen axis."""
-        self._axis.acknowledge()
+        self._axis.orders.acknowledge()
         self.show()
 
     def action_reconcile(self) -> None:
@@ -290,7 +296,7 @@ class Monitor(App[bool]):
             self.show()
             return
         text = f"{axis.name} is in doubt: {axis.state.doubt}.\n\nHave you looked at the machine, and does it stand?"
-        self._ask(_Asked(f"reconcile {axis.name}", text), axis.reconcile)
+        self._ask(_Asked(f"reconcile {axis.name}", text), axis.orders.reconcile)
 
     def action_try_again(self) -> None:
         """Try the line of the chosen axis at once."""
