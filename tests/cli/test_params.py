@@ -1,4 +1,4 @@
-"""``compax params``: read with meanings, written after a question, saved, compared, restored; nothing half in silence."""
+"""``compax params``: read with meanings, written after a question, saved and restored, nothing half in silence."""
 
 from __future__ import annotations
 
