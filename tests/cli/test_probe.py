@@ -1,4 +1,4 @@
-"""``compax probe``: says what it found and how well that is founded, writes a settings file, and never moves anything."""
+"""``compax probe``: says what it found and how well that is founded, writes a settings file, and moves nothing."""
 
 from __future__ import annotations
 
@@ -15,12 +15,14 @@ from tests.fakes.commands import Commands
 from tests.fakes.scripted import ScriptedFarEnd
 
 from compax_aio import DriveSettings
+from compax_aio.compax import probing
 from compax_aio.compax.facts.line import BAUD_RATES
 from compax_aio.compax.facts.status import MARKERS
 from compax_aio.compax.findings import ErrorStyle, Founded
 from compax_aio.compax.plain_line import starts_motion
 from compax_aio.compax.probing import UNKNOWN_STATUS, candidates, probe
 from compax_aio.errors import AnswerTimeoutError, ConnectionLostError, TransportError, UnexpectedAnswerError
+from compax_aio.link.link import Link
 from compax_aio.simulator.clock import VirtualClockLoop
 from compax_aio.simulator.compax import Knobs, LogKind, SimulatedDrive
 from compax_aio.simulator.rates import heard
@@ -224,8 +226,8 @@ async def probed_as(answers: dict[str, bytes | None], **options: Any) -> Any:
 
 
 async def test_what_a_drive_refuses_is_left_out_and_told() -> None:
-    refused = {query: b"E90\r\n>" for query in ("P20", "P19", "P90", "P11", "P12", "S1", "S30", "S16")}
-    report = await probed_as(refused | {f"S{number}": b"E90\r\n>" for number in range(31, 40)})
+    queries = ("P20", "P19", "P90", "P11", "P12", "S1", "S30", "S16", *(f"S{number}" for number in range(31, 40)))
+    report = await probed_as(dict.fromkeys(queries, b"E90\r\n>"))
     assert report.interface is None
     assert report.identification == {}
     for topic in ("P20", "axis", "state", "identification"):
@@ -272,6 +274,15 @@ async def test_s16_that_is_no_status_is_not_decoded() -> None:
 async def test_a_self_test_is_told_as_what_it_may_be() -> None:
     report = await probed_as({"S16": b"S016: 00000000\r\n>", "S30": b"S030: 0 0\r\n>"})
     assert "self-test" in found(report, "state").found
+
+
+@pytest.mark.parametrize(("cts", "says"), [(True, "rtscts=1 can be used"), (False, "would hold the line")])
+async def test_cts_is_told_where_the_port_shows_it(cts: bool, says: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Link, "extra_info", lambda _, name: object() if name == "serial" else None)
+    monkeypatch.setattr(probing, "cts_level", lambda _: cts)
+    report = await probed()
+    assert report.cts is cts
+    assert says in found(report, "handshake").evidence
 
 
 # Nobody, or somebody else ---------------------------------------------------------------------------------------------
@@ -429,10 +440,10 @@ def test_silence_ends_in_4_and_no_traceback(compax: Commands) -> None:
     assert "Traceback" not in outcome.told
 
 
-@pytest.mark.parametrize("words", [("--baud-rate", "0"), ("--timeout", "0"), ("--timeout", "nan"), ("--baud-rate", "x")])
+@pytest.mark.parametrize(
+    "words", [("--baud-rate", "0"), ("--timeout", "0"), ("--timeout", "nan"), ("--baud-rate", "x")]
+)
 def test_options_that_mean_nothing_are_refused(compax: Commands, words: tuple[str, str]) -> None:
     drive = compax.drive("x")
     assert compax("probe", "sim://compax?name=x", *words).code == 2
     assert drive.log.texts(LogKind.LINE) == []
-
-

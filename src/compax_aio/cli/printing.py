@@ -11,7 +11,7 @@ from enum import Enum
 from math import isfinite
 from pathlib import Path
 from types import NoneType
-from typing import Annotated, Any, TextIO
+from typing import Annotated, Any, Final, TextIO
 
 from cyclopts import Parameter
 from rich.console import Console, RenderableType
@@ -20,7 +20,10 @@ from rich.text import Text
 from ..errors import CompaxError
 from .exit_codes import exit_code_of
 
-__all__ = ["Printing", "as_json", "notes_console", "tell_error", "tell_warning"]
+__all__ = ["Printing", "as_json", "notes_console", "results_console", "tell_error", "tell_warning"]
+
+_NARROWEST: Final = 40
+"""Columns; a terminal that is narrower breaks lines itself."""
 
 
 def as_json(value: Any) -> Any:
@@ -52,7 +55,7 @@ class Printing:
         if self.json:
             print(_document(as_json(data), sys.stdout), flush=True)  # noqa: T201
         elif people is not None:
-            Console(highlight=False, soft_wrap=isinstance(people, str | Text)).print(people, markup=False)
+            results_console(soft_wrap=isinstance(people, str | Text)).print(people, markup=False)
 
     def note(self, text: str) -> None:
         """Tell a person what is going on, beside the results; programs are spared it."""
@@ -60,9 +63,29 @@ class Printing:
             notes_console().print(text, markup=False)
 
 
+class _Console(Console):
+    """A console that leaves it to the command what becomes of an output that nobody reads: axes may have to stop."""
+
+    def on_broken_pipe(self) -> None:
+        self.quiet = True
+        raise BrokenPipeError
+
+
 def notes_console() -> Console:
     """Return the console for what is no result: progress, notes and errors."""
-    return Console(file=sys.stderr, highlight=False, soft_wrap=True)
+    return _wide_enough(_Console(file=sys.stderr, highlight=False, soft_wrap=True))
+
+
+def results_console(*, soft_wrap: bool = False) -> Console:
+    """Return the console for results."""
+    return _wide_enough(_Console(highlight=False, soft_wrap=soft_wrap))
+
+
+def _wide_enough(console: Console) -> Console:
+    """Do not believe a terminal that has no width: everything would be cut to nothing."""
+    if (width := console.width) < _NARROWEST:
+        console.width = max(width, _NARROWEST)  # which is kept, also when the terminal gets another one
+    return console
 
 
 def tell_error(error: BaseException, *, as_document: bool) -> None:

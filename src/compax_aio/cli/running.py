@@ -67,6 +67,8 @@ def _told(
             with suppress(OSError):
                 notes_console().print(interruption.text, markup=False)
         return exit_code_of(interrupt)
+    except SystemExit as end:
+        return end.code if isinstance(end.code, int) else OK
     except (Exception, asyncio.CancelledError) as error:
         single = _only_one(error)
         if interruption.note is not None:

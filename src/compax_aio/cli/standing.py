@@ -42,7 +42,8 @@ class Standing:
 
 def as_table(standing: Standing) -> RenderableType:
     """Show *standing*: numbers, bits in two columns, the error with its remedy, what was refused."""
-    return Group(_numbers(standing), Text(""), _bits(standing.status), Text(""), *_troubles(standing))
+    name = Text(standing.drive, style="bold")
+    return Group(name, _numbers(standing), Text(""), _bits(standing.status), Text(""), *_troubles(standing))
 
 
 def as_line(standing: Standing) -> str:
@@ -71,14 +72,14 @@ def _numbers(standing: Standing) -> RenderableType:
         table.add_column(justify="right")
         table.add_column()
     unit = standing.unit
-    table.add_row("position", _number(standing.position), unit, "speed", _number(standing.speed), "% (inferred)")
-    table.add_row("target", _number(standing.target), unit, "torque", _number(standing.torque), "% (inferred)")
+    table.add_row("position", _number(standing.position), unit, "speed", _number(standing.speed, 1), "% (inferred)")
+    table.add_row("target", _number(standing.target), unit, "torque", _number(standing.torque, 1), "% (inferred)")
     table.add_row("following error", _number(standing.following_error), unit, "", "", "")
     return table
 
 
-def _number(value: float | None) -> str:
-    return "not said" if value is None else f"{value:.3f}".rstrip("0").rstrip(".") if value % 1 else f"{value:.0f}"
+def _number(value: float | None, decimals: int = 3) -> str:
+    return "not said" if value is None else f"{value:.{decimals}f}"
 
 
 def _bits(status: DriveStatus | None) -> RenderableType:

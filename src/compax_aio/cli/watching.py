@@ -6,14 +6,14 @@ import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from rich.console import Console, Group, RenderableType
+from rich.console import Group, RenderableType
 from rich.live import Live
 from rich.text import Text
 
 from .. import Drive
 from ..compax.events import ConnectionLost, ConnectionRestored
 from ..compax.watch import Reading
-from .printing import Printing
+from .printing import Printing, results_console
 from .standing import Standing, as_line, as_table
 
 __all__ = ["LineNews", "follow"]
@@ -34,7 +34,7 @@ class _Display:
 
     def __init__(self, printing: Printing) -> None:
         self._printing = printing
-        console = Console(highlight=False)
+        console = results_console()
         is_live = console.is_terminal and not printing.json
         self.live = Live(console=console, auto_refresh=False) if is_live else None
         self._shown: RenderableType = Text("waiting for the first reading")
