@@ -17,6 +17,7 @@ from docutils.parsers.rst import Directive
 from sphinx.application import Sphinx
 
 from compax_aio import errors
+from compax_aio.cli.exit_codes import EXIT_CODES
 from compax_aio.compax.facts.certainty import Certainty
 from compax_aio.compax.facts.control_functions import CONTROL_FUNCTIONS
 from compax_aio.compax.facts.device_errors import DEVICE_ERRORS, ERROR_RANGES
@@ -113,6 +114,18 @@ def _error_ranges() -> Table:
 
 def _range(codes: range) -> str:
     return f"E{codes[0]} to E{codes[-1]}" if len(codes) > 1 else f"{codes[0]}"
+
+
+def _exit_codes() -> Table:
+    rows = [
+        (str(row.code), row.meaning, ", ".join(_kind(kind) for kind in row.kinds))
+        for row in sorted(EXIT_CODES, key=lambda row: row.code)
+    ]
+    return ("code", "what it says", "ended by"), rows
+
+
+def _kind(kind: type[BaseException]) -> str:
+    return "any other" if kind is Exception else kind.__name__
 
 
 # Facts
@@ -369,6 +382,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
     """Add a directive for each table."""
     tables: Iterable[tuple[str, Callable[[], Table]]] = (
         ("table-of-errors", _errors),
+        ("table-of-exit-codes", _exit_codes),
         ("table-of-device-errors", _device_errors),
         ("table-of-error-ranges", _error_ranges),
         ("table-of-status-values", _status_values),

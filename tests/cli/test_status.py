@@ -6,6 +6,7 @@ import io
 import json
 import signal
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from rich.console import Console
@@ -162,17 +163,16 @@ def test_a_line_that_is_lost_and_back_is_told_and_survived(compax: Commands) -> 
     assert outcome.code == 130
 
 
-def test_a_line_that_is_given_up_ends_the_watch(compax: Commands, tmp_path: object) -> None:
+def test_a_line_that_is_given_up_ends_the_watch(compax: Commands, tmp_path: Path) -> None:
     drive = compax.drive("x")
-    settings = f"{tmp_path}/x.toml"
-    with open(settings, "w") as file:  # noqa: PTH123
-        file.write("reconnect = false\n")
+    settings = tmp_path / "x.toml"
+    settings.write_text("reconnect = false\n")
 
     def pull() -> None:
         drive.served_by._write.__self__.abort()  # type: ignore[union-attr]
 
     compax.after(1.1, pull)
-    outcome = compax("status", "sim://compax?name=x", "--watch", "--settings", settings)
+    outcome = compax("status", "sim://compax?name=x", "--watch", "--settings", str(settings))
     assert outcome.code == 3
     assert "the line was lost" in outcome.told
 
@@ -226,3 +226,15 @@ def test_on_a_terminal_the_display_is_kept_up_to_date_in_place(
     assert "The line was lost, and is tried again all the while" in outcome.told
     assert "The line is back after" in outcome.told
     assert outcome.out.count("\x1b[?25l") == outcome.out.count("\x1b[?25h") == 1
+
+
+def test_the_conversation_is_recorded_where_that_is_wanted(compax: Commands, tmp_path: Path) -> None:
+    drive = compax.drive("x")
+    trace = tmp_path / "x.trace"
+    assert compax("status", "sim://compax?name=x", "--trace", str(trace)).code == 0
+    assert "S17" in trace.read_text()
+    asked = len(drive.log)
+    outcome = compax("status", "sim://compax?name=x", "--trace", str(tmp_path / "no" / "x.trace"))
+    assert outcome.code == 2
+    assert "cannot be written: No such file or directory" in outcome.told
+    assert len(drive.log) == asked, "nothing was sent"

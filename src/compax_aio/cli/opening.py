@@ -58,12 +58,22 @@ class DriveLine:
 
     @asynccontextmanager
     async def recorded(self) -> AsyncIterator[None]:
-        """Record what goes over lines that are opened in this block, if that is wanted."""
+        """
+        Record what goes over lines that are opened in this block, if that is wanted.
+
+        Raises:
+            InvalidCommandError: The file cannot be written.
+        """
         async with AsyncExitStack() as stack:
             if self.trace is not None:
                 from compax_aio.recording import record_trace  # noqa: PLC0415 - few need it
 
-                await stack.enter_async_context(record_trace(self.trace))
+                try:
+                    await stack.enter_async_context(record_trace(self.trace))
+                except OSError as error:
+                    raise InvalidCommandError(
+                        f"the trace {self.trace} cannot be written: {error.strerror or error}"
+                    ) from error
             yield
 
     def drive_settings(self) -> DriveSettings:
