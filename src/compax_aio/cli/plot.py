@@ -80,7 +80,7 @@ def plot(
                 for record in records
             ],
         },
-        f"{picture}: {', '.join(dict.fromkeys(name for record in records for name in record.axes))}",
+        f"{picture}: {', '.join(axis or dict.fromkeys(name for record in records for name in record.axes))}",
     )
 
 

@@ -15,7 +15,7 @@ from rich.console import Group
 from rich.live import Live
 from rich.text import Text
 
-from compax_aio import Drive, DriveGroup, InvalidCommandError
+from compax_aio import Drive, DriveGroup, InvalidCommandError, MoveResult
 from compax_aio.checked_numbers import check_number
 from compax_aio.compax.vocabulary import MovePlan, plan_move_to
 from compax_aio.recording import MotionRecording
@@ -23,9 +23,9 @@ from compax_aio.recording import record as record_motion
 from compax_aio.recording.motion_asking import QUANTITIES, check_record
 
 from .files import Force, expect_free
-from .interruption import in_motion
+from .interruption import in_motion, say_at_end
 from .monitoring.wanted import WantedAxis, wanted_axes
-from .moving import stop_interrupted
+from .moving import stop_interrupted, written
 from .opening import DriveLine
 from .printing import Printing, notes_console
 
@@ -101,8 +101,11 @@ async def record(
     check_record(output, quantities=quantity, interval_s=interval, line_share=line_share)
     expect_free(output, force=force)
     ending = _ending(axes, seconds, move, speed, tail)
+    if ending.plan is None:
+        say_at_end("Interrupted. This command sets nothing in motion.")
     async with DriveLine(trace=trace).recorded(), _connected(axes) as drives:
         recording: MotionRecording | None = None
+        result: MoveResult | None = None
         try:
             async with (
                 record_motion(
@@ -115,10 +118,10 @@ async def record(
                 ) as recording,
                 _shown(recording, drives, printing),
             ):
-                await _until_end(recording, drives, ending, printing)
+                result = await _until_end(recording, drives, ending, printing)
         finally:
             if recording is not None and recording.error is None:
-                _tell(recording, drives, printing)
+                _tell(recording, drives, result, printing)
 
 
 def _ending(
@@ -149,12 +152,14 @@ async def _connected(axes: tuple[WantedAxis, ...]) -> AsyncIterator[dict[str, Dr
         yield group.drives
 
 
-async def _until_end(recording: MotionRecording, drives: dict[str, Drive], ending: _Ending, printing: Printing) -> None:
+async def _until_end(
+    recording: MotionRecording, drives: dict[str, Drive], ending: _Ending, printing: Printing
+) -> MoveResult | None:
     if ending.plan is not None:
-        ((_, drive),) = drives.items()
-        await _move(drive, ending.plan, printing)
+        (drive,) = drives.values()
+        result = await _move(drive, ending.plan, printing)
         await _wait(recording, ending.tail_s)
-        return
+        return result
     try:
         await _wait(recording, ending.seconds)
     except asyncio.CancelledError:
@@ -162,6 +167,7 @@ async def _until_end(recording: MotionRecording, drives: dict[str, Drive], endin
         task = asyncio.current_task()
         assert task is not None
         task.uncancel()
+    return None
 
 
 async def _wait(recording: MotionRecording, seconds: float | None) -> None:
@@ -173,11 +179,11 @@ async def _wait(recording: MotionRecording, seconds: float | None) -> None:
         pass
 
 
-async def _move(drive: Drive, plan: MovePlan, printing: Printing) -> None:
+async def _move(drive: Drive, plan: MovePlan, printing: Printing) -> MoveResult:
     going = drive.start(plan)
     try:
         with in_motion(drive.name):
-            await going
+            return await going
     except asyncio.CancelledError:
         going.cancel()  # where it was not awaited yet
         await stop_interrupted(drive, printing, was_sent=going.is_on_wire)
@@ -223,7 +229,7 @@ def _foot(recording: MotionRecording) -> Text:
     return Text(said, style="dim")
 
 
-def _tell(recording: MotionRecording, drives: dict[str, Drive], printing: Printing) -> None:
+def _tell(recording: MotionRecording, drives: dict[str, Drive], result: MoveResult | None, printing: Printing) -> None:
     duration_s = recording.ended_after_s
     rates = {axis: recording.samples_of(axis) / duration_s if duration_s else 0.0 for axis in drives}
     document: dict[str, Any] = {
@@ -234,10 +240,13 @@ def _tell(recording: MotionRecording, drives: dict[str, Drive], printing: Printi
         "missing": recording.missing,
         "rows_lost": recording.rows_lost,
         "samples_per_s": {axis: round(rate, 2) for axis, rate in rates.items()},
+        "move": result,
     }
-    told = f"{recording.path}: {recording.samples} values in {duration_s:.1f} s; a second " + ", ".join(
-        f"{rate:.1f} of {axis}" for axis, rate in rates.items()
-    )
+    each = ", ".join(f"{axis} {rate:.1f}" for axis, rate in rates.items())
+    told = f"{recording.path}: {recording.samples} values in {duration_s:.1f} s; values a second: {each}"
+    if result is not None:
+        (drive,) = drives.values()
+        told = f"{drive.name}: {written(drive, result.target)} reached in {result.duration_s:.2f} s\n{told}"
     if recording.missing:
         told += f"; {recording.missing} were asked for and not said"
     if recording.rows_lost:

@@ -115,7 +115,7 @@ def check_record(
     if not 0 < check_number("line_share", line_share) <= 1:
         raise InvalidCommandError(f"line_share is above 0 and at most 1, not {line_share!r}")
     if is_parquet(path):
-        from . import motion_parquet  # noqa: F401, PLC0415 - the library is an extra
+        from .motion_parquet import convert  # noqa: F401, PLC0415 - the library is an extra
 
 
 def _check_quantities(quantities: Sequence[str]) -> None:

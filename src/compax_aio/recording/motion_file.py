@@ -203,6 +203,7 @@ class RecordFile:
         """
         if self._file is None or self._file.closed:
             return False
+        self.write_waiting()
         self._waiting.append(ended)
         self.write_waiting()
         try:

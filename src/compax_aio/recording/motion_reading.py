@@ -10,7 +10,7 @@ from datetime import datetime
 from math import isnan, nan
 from pathlib import Path
 from types import MappingProxyType
-from typing import Final
+from typing import BinaryIO, Final
 
 from ..errors import InvalidCommandError
 from ..escaping import shown
@@ -119,23 +119,34 @@ def _read_csv(path: Path) -> MotionRecord:
     if path.exists() and not path.is_file():
         raise InvalidCommandError(f"{name_of(path)} is no plain file, and so no record")
     gathering = _Gathering(name_of(path))
-    dropped = b""
+    dropped = 0
     with path.open("rb") as file:
         number = 0
         while line := file.readline(_MAX_LINE):
             number += 1
             where = f"{name_of(path)}, line {number}"
             if not line.endswith(b"\n"):
-                dropped = line + file.read(1)
-                if len(dropped) > _MAX_LINE or not _may_be_a_beginning(line, is_first=number == 1):
+                zeros = _zeros_to_the_end(file)
+                if zeros is None or not _may_be_a_beginning(line, is_first=number == 1):
                     raise InvalidCommandError(f"{where}: it is no line of a motion record: {shown(line[:40])}")
+                dropped = len(line) + zeros
                 break
             _take_line(gathering, line, number, where)
     return gathering.record(path, _told_dropped(dropped))
 
 
+def _zeros_to_the_end(file: BinaryIO) -> int | None:
+    """Count the zeros that a dying disk has left behind; None if there is something else."""
+    count = 0
+    while piece := file.read(_MAX_LINE):
+        if piece.strip(b"\0"):
+            return None
+        count += len(piece)
+    return count
+
+
 def _may_be_a_beginning(line: bytes, *, is_first: bool) -> bool:
-    """Whether *line*, which has no end, may be all that was written of one; disks may leave zeros behind."""
+    """Whether *line*, which has no end, may be all that was written of one."""
     return not is_first or _HEAD.encode().startswith(line.rstrip(b"\0").rstrip(b"\r"))
 
 
@@ -158,8 +169,8 @@ def _take_line(gathering: _Gathering, line: bytes, number: int, where: str) -> N
     gathering.take(Row.of_fields(fields, where), where)
 
 
-def _told_dropped(dropped: bytes) -> str:
-    return f"its last {len(dropped)} bytes make no whole line" if dropped else ""
+def _told_dropped(dropped: int) -> str:
+    return f"its last {dropped} bytes make no whole line" if dropped else ""
 
 
 @dataclass(slots=True)
