@@ -171,9 +171,11 @@ class MoveView:
                 TimeElapsedColumn(),
                 console=notes_console(),
                 transient=True,
+                auto_refresh=False,  # the follower does, in the event loop
             )
             self._task = self._bar.add_task(self._title, total=None, position="", state="")
             self._bar.start()
+            self.show()
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -205,6 +207,7 @@ class MoveView:
                 completed=done or 0.0,
                 position="" if self._position is None else written(self._drive, self._position),
                 state=state,
+                refresh=True,
             )
 
     def _state_now(self) -> str:

@@ -111,9 +111,11 @@ class RunView:
                 TimeElapsedColumn(),
                 console=notes_console(),
                 transient=True,
+                auto_refresh=False,  # the follower does, in the event loop
             )
             self._task = self._bar.add_task("", total=None, position="")
             self._bar.start()
+            self.show()
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -133,4 +135,5 @@ class RunView:
             self._task,
             description=f"{self._drive.name} {'runs its program' if is_there else 'may run on: the line is lost'}",
             position="" if self._position is None else written(self._drive, self._position),
+            refresh=True,
         )

@@ -26,7 +26,8 @@ def counting(title: str, printing: Printing) -> Iterator[Callable[[int, int], No
         TimeRemainingColumn(),
         console=notes_console(),
         transient=True,
+        auto_refresh=False,
     )
     with bar:
         task = bar.add_task(title, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
+        yield lambda done, total: bar.update(task, completed=done, total=total, refresh=True)
