@@ -73,6 +73,7 @@ class Cable:
         self._tampers.clear()
         self.delay_s = {"to_drive": 0.0, "to_host": 0.0}
         self.piece = None
+        self.piece_gap_s = 0.0
 
     def tampered(self, direction: Direction, data: bytes) -> tuple[bytes, bool]:
         """Do to *data* what is due; also say whether the connection is cut behind it."""

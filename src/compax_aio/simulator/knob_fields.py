@@ -12,7 +12,7 @@ from typing import Annotated, Any, Protocol, TypeVar
 
 from compax_aio.errors import TransportError
 
-__all__ = ["Choice", "Range", "check_knobs", "impossible", "knobs_from_query"]
+__all__ = ["Choice", "Range", "allowed_values", "check_knobs", "impossible", "knobs_from_query"]
 
 _T = TypeVar("_T")
 
@@ -79,6 +79,11 @@ def knobs_from_query(kind: Callable[..., _T], device: str, query: Mapping[str, s
         except (KeyError, ValueError):
             raise impossible(device, key, text, allowed) from None
     return kind(**values)
+
+
+def allowed_values(kind: type) -> Mapping[str, str]:
+    """Say of each knob, by its name, which values it takes."""
+    return {name: allowed for name, (_, _, allowed) in _fields(kind).items()}
 
 
 def impossible(device: str, key: str, value: object, allowed: str) -> TransportError:

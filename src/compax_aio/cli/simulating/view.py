@@ -1,0 +1,111 @@
+"""What the far end sees, live: lines received, answers, motions, faults; for people, or as lines of JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Final
+
+from rich.text import Text
+
+from compax_aio.escaping import escaped
+
+from ..printing import Printing
+from .devices import Device, Entry
+
+__all__ = ["SimView"]
+
+_FROM_HOST: Final = ("→", "bold")
+_TO_HOST: Final = ("←", "cyan")
+_MOTION: Final = ("◆", "green")
+_TROUBLE: Final = ("✗", "red")
+_LIFE: Final = ("·", "dim")
+_LOOKS: Final[Mapping[str, tuple[str, str]]] = {
+    "line": _FROM_HOST,
+    "command": _FROM_HOST,
+    "answer": _TO_HOST,
+    "message": _TO_HOST,
+    "motion_started": _MOTION,
+    "motion_continued": _MOTION,
+    "speed_changed": _MOTION,
+    "motion_reached": _MOTION,
+    "motion_ended": _MOTION,
+    "motion_stopped": _MOTION,
+    "motion_fault": _TROUBLE,
+    "fault": _TROUBLE,
+    "lost": _TROUBLE,
+    "trouble": _TROUBLE,
+    "overrun": _TROUBLE,
+    "refused": _TROUBLE,
+    "befell": _TROUBLE,
+}
+_WORDLESS: Final = frozenset({"line", "command", "answer", "message", "trouble", "befell"})
+"""Their text alone says it all."""
+_CHARACTERS: Final = "received"
+"""Of a line of axes: single characters, which the commands show better."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    at_s: float
+    device: str
+    kind: str
+    text: str
+    axis: str = ""
+    position: float | None = None
+
+
+class SimView:
+    """
+    Prints what devices do and what befalls them.
+
+    Args:
+        printing: For people or programs.
+        is_quiet: Nothing but what was asked for.
+        began_at: The time from which times are counted.
+    """
+
+    def __init__(self, printing: Printing, *, is_quiet: bool, began_at: float) -> None:
+        self._printing = printing
+        self._is_quiet = is_quiet
+        self._began_at = began_at
+        self._name_width = 0
+
+    def watch(self, devices: Mapping[str, Device]) -> None:
+        """Print what each device logs from now on."""
+        self._name_width = max(map(len, devices)) if len(devices) > 1 else 0
+        for name, device in devices.items():
+            device.log.on_entry = lambda entry, name=name: self.entry(name, entry)
+
+    def entry(self, name: str, entry: Entry) -> None:
+        """Print what a device has logged."""
+        kind = entry.kind.value
+        if not self._is_quiet and kind != _CHARACTERS:
+            axis, position = getattr(entry, "axis", ""), getattr(entry, "position", None)
+            self._show(_Seen(self._time_s(entry.at), name, kind, entry.text, axis, position))
+
+    def befell(self, name: str, at: float, text: str) -> None:
+        """Print what has befallen a device or its line."""
+        if not self._is_quiet:
+            self._show(_Seen(self._time_s(at), name, "befell", text))
+
+    def _time_s(self, at: float) -> float:
+        return round(at - self._began_at, 3)
+
+    def _show(self, seen: _Seen) -> None:
+        self._printing.show(
+            {key: value for key, value in asdict(seen).items() if value not in {None, ""}}, self._told(seen)
+        )
+
+    def _told(self, seen: _Seen) -> Text:
+        mark, style = _LOOKS.get(seen.kind, _LIFE)
+        words = [] if seen.kind in _WORDLESS else [seen.kind.replace("_", " ")]
+        words += [escaped(seen.text)] if seen.text else []
+        words += [] if seen.position is None else [f"at {seen.position:g}"]
+        return Text.assemble(
+            (f"{seen.at_s:9.3f}  ", "dim"),
+            (f"{seen.device:{self._name_width}}  " if self._name_width else ""),
+            (f"{mark} ", style),
+            (f"{seen.axis}  " if seen.axis else "", "bold"),
+            (" ".join(words) or "(empty)", style),
+        )
