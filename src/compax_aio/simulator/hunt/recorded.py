@@ -35,9 +35,9 @@ SLACK_S: Final = 0.002
 NO_ANSWER: Final = frozenset({"AnswerTimeoutError", "ConnectionLostError"})
 
 NOT_IN_TRACES: Final[Mapping[str, str]] = {
-    "P5": "a trace does not hold who was cancelled, and whether it should have stopped the axis",
-    "P7": "a trace does not hold what else the program had to do",
-    "P8": "a trace does not hold how much memory was used",
+    "P5": "who was cancelled, and was to stop the axis, is not in a trace",
+    "P7": "what else the program had to do is not in a trace",
+    "P8": "how much memory was used is not in a trace",
 }
 """By number, promises of which no trace can tell, and why."""
 
