@@ -179,5 +179,5 @@ class Interruption:
 
     @staticmethod
     def _say(text: str) -> None:
-        with suppress(OSError):  # of a terminal that is gone
+        with suppress(OSError, RuntimeError):  # of a terminal that is gone, or in the middle of another print
             notes_console().print(text, markup=False)
