@@ -13,10 +13,21 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedCo
 
 from compax_aio import CompaxError, Drive, Move, MoveResult
 
+from ..motion.moves import MoveFuture
 from .interruption import in_motion, say_at_end
 from .printing import Printing, notes_console
 
-__all__ = ["MoveView", "TimeoutS", "View", "carry_out", "following", "note_where_from", "stop_interrupted", "written"]
+__all__ = [
+    "MoveView",
+    "MovedAxis",
+    "TimeoutS",
+    "View",
+    "carry_out",
+    "following",
+    "note_where_from",
+    "stop_interrupted",
+    "written",
+]
 
 TimeoutS = Annotated[
     float | None,
@@ -33,7 +44,7 @@ _PATIENCE_S: Final = 0.25
 _CONFIRMATIONS: Final = {"message": "by the drive's message ($)", "status": "by the drive's status (S16, S17)"}
 
 
-def written(drive: Drive, position: float | None) -> str:
+def written(drive: MovedAxis, position: float | None) -> str:
     """Write a position with the unit of the axis."""
     return "an unknown position" if position is None else f"{position:.{drive.settings.decimals}f} {drive.unit}"
 
@@ -92,7 +103,7 @@ def _show_result(drive: Drive, result: MoveResult, position: float | None, print
 
 
 async def stop_interrupted(
-    drive: Drive,
+    drive: MovedAxis,
     printing: Printing,
     *,
     was_sent: bool = True,
@@ -131,6 +142,44 @@ async def stop_interrupted(
 # Progress -----------------------------------------------------------------------------------------------------------
 
 
+class MovedSettings(Protocol):
+    """What is known of how an axis is talked to."""
+
+    @property
+    def decimals(self) -> int:
+        """Of positions."""
+
+    @property
+    def answer_timeout_s(self) -> float:
+        """How long an answer may take."""
+
+
+class MovedAxis(Protocol):
+    """An axis of any kind, as far as a view of its motion and a stop need it."""
+
+    @property
+    def name(self) -> str:
+        """What it is called."""
+
+    @property
+    def unit(self) -> str:
+        """In which its positions are counted."""
+
+    @property
+    def is_open(self) -> bool:
+        """Whether its line is there."""
+
+    @property
+    def settings(self) -> MovedSettings:
+        """How it is talked to."""
+
+    async def position(self) -> float:
+        """Read where it is."""
+
+    async def stop(self) -> None:
+        """Stop it, and return when it stands."""
+
+
 class View(Protocol):
     """What shows how an axis is doing."""
 
@@ -151,7 +200,7 @@ class MoveView:
         printing: How it is said.
     """
 
-    def __init__(self, drive: Drive, move: Move, printing: Printing) -> None:
+    def __init__(self, drive: MovedAxis, move: MoveFuture, printing: Printing) -> None:
         self._drive = drive
         self._move = move
         self._printing = printing
@@ -195,7 +244,8 @@ class MoveView:
     def show(self) -> None:
         """Show how the move and its line stand now."""
         state = self._state_now()
-        if state != self._state and self._bar is None and not self._move.done():
+        is_news = state != self._state and (self._move.accepted.done() or not self._drive.is_open)
+        if is_news and self._bar is None and not self._move.done():
             self._printing.note(f"{self._drive.name}: {state}")
         self._state = state
         if self._bar is not None:
@@ -227,7 +277,7 @@ class MoveView:
 
 
 @asynccontextmanager
-async def following(drive: Drive, view: View) -> AsyncIterator[None]:
+async def following(drive: MovedAxis, view: View) -> AsyncIterator[None]:
     """Read the position again and again for *view*, during a block."""
     follower = asyncio.ensure_future(_follow(drive, view))
     try:
@@ -236,7 +286,7 @@ async def following(drive: Drive, view: View) -> AsyncIterator[None]:
         follower.cancel()
 
 
-async def _follow(drive: Drive, view: View) -> None:
+async def _follow(drive: MovedAxis, view: View) -> None:
     while True:
         with _ended(asyncio.ensure_future(drive.position())) as reading:
             while not reading.done():
