@@ -315,7 +315,7 @@ def test_only_a_yes_is_a_yes(
     answer(said)
     outcome = compax("params", "set", X, "P40=1", "--name", "x")
     assert outcome.code == 0
-    assert "Write 1 of the parameters of x? [y/N]" in outcome.told
+    assert "Write 1 parameter of x? [y/N]" in outcome.told
     assert written(x) == (["P40=1.000"] if said.lower().startswith(b"y") else [])
     assert ("Nothing was written." in outcome.out) is not bool(written(x))
 

@@ -144,7 +144,7 @@ async def save(
             values = await kind.of(drive).save(file, on_progress=on_progress)
     printing.show(
         {"drive": drive.name, "file": file, "kind": kind.table.kind, "count": len(values)},
-        f"{len(values)} {kind.table.kind} of {drive.name} saved to {file}",
+        f"{kind.counted(len(values))} of {drive.name} saved to {file}",
     )
 
 
@@ -251,7 +251,7 @@ async def _write(
             "unchanged": would.unchanged,
             "pending": [kind.table.name(number) for number in pending],
         },
-        f"{drive.name}: {len(done.changed)} {kind.table.kind} written and read back{waiting}",
+        f"{drive.name}: {kind.counted(len(done.changed))} written and read back{waiting}",
     )
 
 
@@ -262,7 +262,7 @@ async def _is_wanted(
         notes_console().print(changes_table(kind, changes, drive.unit), markup=False)
     if (note := kind.note_on(changes)) is not None:
         printing.note(note)
-    return yes or await confirm(f"Write {len(changes)} of the {kind.table.kind} of {drive.name}?")
+    return yes or await confirm(f"Write {kind.counted(len(changes))} of {drive.name}?")
 
 
 def _unlocked(drive: Drive, kind: Kind, pending: tuple[int, ...]) -> AbstractAsyncContextManager[Any]:

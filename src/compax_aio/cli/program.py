@@ -155,7 +155,7 @@ async def upload(
 
 def _show_uploaded(drive: Drive, uploaded: Uploaded, file: Path | None, printing: Printing) -> None:
     count = len(uploaded.program)
-    text = uploaded.listing().rstrip("\n") if file is None else f"{count} records of {drive.name} written to {file}"
+    text = uploaded.listing().rstrip("\n") if file is None else f"{_counted(count)} of {drive.name} written to {file}"
     printing.show(
         {
             "drive": drive.name,
@@ -221,8 +221,12 @@ async def download(
             "unchanged": done.unchanged,
             "not_verifiable": [_name(number) for number in done.not_verifiable],
         },
-        f"{drive.name}: {len(done.changed)} records written and read back, {done.unchanged} were there{cut}",
+        f"{drive.name}: {_counted(len(done.changed))} written and read back, {done.unchanged} were there{cut}",
     )
+
+
+def _counted(count: int) -> str:
+    return "1 record" if count == 1 else f"{count} records"
 
 
 def _names(numbers: Iterable[int]) -> str:
@@ -241,4 +245,4 @@ async def _is_wanted(drive: Drive, changed: Mapping[int, tuple[str, str]], *, ye
         for number, (old, new) in changed.items():
             table.add_row(_name(number), old.strip(), "→", new)
         notes_console().print(table, markup=False)
-    return yes or await confirm(f"Write {len(changed)} records of {drive.name}?")
+    return yes or await confirm(f"Write {_counted(len(changed))} of {drive.name}?")

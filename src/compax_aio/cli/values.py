@@ -52,6 +52,10 @@ class Kind:
         """Return those of *drive*."""
         return drive.parameters if self.is_protected else drive.variables
 
+    def counted(self, count: int) -> str:
+        """Write how many there are: ``1 parameter``, ``3 variables``."""
+        return f"{count} {self.table.kind.removesuffix('s') if count == 1 else self.table.kind}"
+
     def written(self, number: int, value: float | None) -> str:
         """Write a value with the decimals that it is stored with, or with as many as it has."""
         if value is None:
