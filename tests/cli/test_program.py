@@ -248,6 +248,16 @@ def test_one_that_takes_too_long_is_stopped(compax: Commands, loaded: SimulatedD
     assert not loaded.moving
 
 
+def test_one_that_takes_too_long_and_cannot_be_stopped_is_not_said_to_stand(
+    compax: Commands, loaded: SimulatedDrive
+) -> None:
+    loaded.load_program(["POSA 4000", "END"])
+    when_received(loaded, compax, "STOP", lambda: setattr(loaded, "silent", True))
+    outcome = compax("program", "run", X, "--wait", "--timeout", "1", "--name", "x")
+    assert outcome.code == 4
+    assert "and stands" not in outcome.told
+
+
 @pytest.mark.parametrize(
     "words", [("--from", "0"), ("--from", "251"), ("--timeout", "5"), ("--wait", "--timeout", "0")]
 )

@@ -13,6 +13,7 @@ from compax_aio.compax.settings import Dialect
 from compax_aio.compax.stop_first import stop_first
 from compax_aio.simulator.compax import Knobs, LogKind, SimulatedDrive
 from compax_aio.simulator.server import serve_loopback
+from compax_aio.transports.loopback import listen
 
 
 @asynccontextmanager
@@ -103,3 +104,20 @@ async def test_one_that_is_cancelled_while_the_axis_brakes_ends_at_its_standstil
         with pytest.raises(asyncio.CancelledError):
             await stopping
         assert not drive.moving
+
+
+async def test_a_line_that_is_lost_under_stop_is_told_as_one_on_which_it_was_sent() -> None:
+    class HangsUp(asyncio.Protocol):
+        def connection_made(self, transport: asyncio.BaseTransport) -> None:
+            assert isinstance(transport, asyncio.Transport)
+            self.transport = transport
+
+        def data_received(self, data: bytes) -> None:
+            self.transport.close()
+
+    listener = await listen("hangs-up", HangsUp)
+    with pytest.raises(compax_aio.ConnectionLostError) as failure:
+        await stop_first("loop://hangs-up")
+    listener.close()
+    assert failure.value.what.startswith("STOP was sent, and not acknowledged: ")
+    assert "the axis may be moving" in str(failure.value.hint)
