@@ -381,7 +381,7 @@ SMC: Final = Diagram(
         (_S.READY, _S.TYPING): Route(via=((832, 620), (832, 190))),
         (_S.ENDING, _S.READY): Route(via=((808, 330), (808, 600)), label_at=2),
     },
-    anywhere={_S.IN_DOUBT: (416, 200), _S.CLEARING: (153, 50)},
+    anywhere={_S.IN_DOUBT: (416, 184), _S.CLEARING: (153, 50)},
 )
 
 
