@@ -10,6 +10,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from math import inf, isfinite
 from pathlib import Path
+from textwrap import fill, wrap
 from typing import Any, Final
 
 from ..errors import InvalidCommandError
@@ -48,6 +49,10 @@ _FIRST_PANEL_IN: Final = 2.2
 _LANE_IN: Final = 0.155
 _HEAD_IN: Final = 0.95
 """Of title, time scale and legend."""
+_TITLE_LETTERS: Final = 65
+_SUBTITLE_LETTERS: Final = 105
+_LETTER_IN: Final = 0.075
+"""Of the legend; few are wider."""
 _DPI: Final = 200
 _SLICES: Final = 1500
 """More than there are dots from left to right."""
@@ -199,6 +204,12 @@ def _subtitle(records: Sequence[MotionRecord]) -> str:
     return "   ".join(told)
 
 
+def _columns(handles: Sequence[Line2D]) -> int:
+    """Return how many columns of a legend the page has room for."""
+    longest = max(len(str(handle.get_label())) for handle in handles)
+    return min(len(handles), max(1, int(_WIDTH_IN / (longest * _LETTER_IN + 0.6))))
+
+
 class _Plot:
     """
     One figure: a strip for the labels of marks, and a panel for each quantity below it.
@@ -277,7 +288,7 @@ class _Plot:
         ]
         if any(curve.is_target for panel in self._panels for curve in panel.curves):
             handles.append(Line2D([], [], color=_NEUTRAL, linestyle=(0, (2, 1.5)), linewidth=0.9, label="target"))
-        self.figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 6))
+        self.figure.legend(handles=handles, loc="outside lower center", ncols=_columns(handles))
 
     def draw_marks(self, marks: Sequence[tuple[str, RecordMark]], units: dict[str, str]) -> None:
         """Draw a line through all panels for each mark; where the labels go, :meth:`fit` finds out."""
@@ -298,16 +309,14 @@ class _Plot:
 
     def write_title(self, title: str, subtitle: str) -> None:
         """Write the title of the figure, and smaller below it when and where it is from."""
-        self._strip.set_title(title, fontsize=10, fontweight="bold", loc="left", pad=14, wrap=True)
-        self._strip.annotate(
-            subtitle,
-            (0, 1),
-            xycoords="axes fraction",
-            xytext=(0, 4),
-            textcoords="offset points",
-            fontsize=7,
-            color=_NEUTRAL,
+        lines = wrap(subtitle, _SUBTITLE_LETTERS)
+        self._strip.set_title(
+            fill(title, _TITLE_LETTERS), fontsize=10, fontweight="bold", loc="left", pad=5 + 9 * len(lines)
         )
+        self._strip.annotate(
+            "\n".join(lines), (0, 1), xycoords="axes fraction", xytext=(0, 4), textcoords="offset points", fontsize=7,
+            color=_NEUTRAL,
+        )  # fmt: skip
 
     def fit(self) -> None:
         """Lay all of it out: how much room the labels leave for the panels decides how wide these are, and back."""
@@ -348,11 +357,11 @@ class _Plot:
         if without:
             text = f"{without} more marks without a label"
             self._written.append(
-                self._strip.annotate(
+                self._areas[-1].annotate(
                     text,
-                    (1, 1),
-                    xycoords="axes fraction",
-                    xytext=(0, 4),
+                    (1, 0),
+                    xycoords=("axes fraction", self._areas[-1].xaxis.label),
+                    xytext=(0, 0),
                     textcoords="offset points",
                     ha="right",
                     fontsize=7,

@@ -110,7 +110,9 @@ def shown_axes(records: Sequence[MotionRecord], names: Sequence[str], *, overlay
 
 def _distinct_name(record: MotionRecord, records: Sequence[MotionRecord]) -> str:
     same = [other for other in records if other.path.stem == record.path.stem]
-    return record.path.stem if len(same) == 1 else str(records.index(record) + 1)
+    if len(same) == 1:
+        return record.path.stem
+    return str(next(number for number, other in enumerate(records, 1) if other is record))
 
 
 def panels_of(axes: Sequence[ShownAxis], span: Span) -> list[Panel]:
