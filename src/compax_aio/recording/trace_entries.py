@@ -196,6 +196,8 @@ def decoded(text: str) -> TraceEntry:
     Raises:
         InvalidCommandError: It is none; says why.
     """
+    if not text.isascii():
+        raise InvalidCommandError("it holds a character that is not ASCII")
     try:
         entry = json.loads(text)
     except (ValueError, RecursionError) as error:
