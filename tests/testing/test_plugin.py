@@ -40,6 +40,24 @@ def run(pytester: pytest.Pytester, test: str, *arguments: str, mode: str = "stri
     return pytester.runpytest_inprocess("-p", "no:cacheprovider", *arguments)
 
 
+def test_the_time_is_told_outside_of_the_loop_as_well(pytester: pytest.Pytester) -> None:
+    run(
+        pytester,
+        """
+@pytest.fixture
+def looked_at(virtual_time):
+    assert virtual_time.now == 0
+    yield
+    assert virtual_time.now == 3600
+
+@pytest.mark.parametrize("again", [1, 2])
+async def test_an_hour(looked_at, again):
+    await asyncio.sleep(3600)
+""",
+        mode="auto",
+    ).assert_outcomes(passed=2)
+
+
 @pytest.mark.parametrize("mode", ["strict", "auto"])
 def test_a_coroutine_test_runs_in_virtual_time(pytester: pytest.Pytester, mode: str) -> None:
     mark = "@pytest.mark.asyncio" if mode == "strict" else ""

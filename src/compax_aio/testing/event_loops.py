@@ -28,6 +28,17 @@ _CHOSEN: pytest.StashKey[set[str]] = pytest.StashKey()
 """The tests whose loop was chosen here, by their node ids without parameters."""
 
 
+_newest: VirtualClockLoop | None = None
+"""The last loop that was made here, kept when it is closed: a fixture that ends later still asks for the time."""
+
+
+def _new_loop() -> VirtualClockLoop:
+    """Make the loop of a coroutine test; whoever calls this knows nothing of the test."""
+    global _newest  # noqa: PLW0603
+    _newest = VirtualClockLoop()
+    return _newest
+
+
 class _LoopsOfPytestAsyncio:
     """Answers pytest-asyncio for one test."""
 
@@ -37,7 +48,7 @@ class _LoopsOfPytestAsyncio:
     ) -> Mapping[str, Callable[[], asyncio.AbstractEventLoop]]:
         """Give the test its virtual clock."""
         config.stash.setdefault(_CHOSEN, set()).add(item.nodeid)
-        return {_FACTORY: VirtualClockLoop}
+        return {_FACTORY: _new_loop}
 
 
 @contextmanager
@@ -46,7 +57,7 @@ def chosen_for(metafunc: pytest.Metafunc) -> Iterator[None]:
     definition = metafunc.definition
     if _ANYIO in metafunc.fixturenames:
         if not any(_ANYIO in _names_of(mark) for mark in definition.iter_markers("parametrize")):
-            backend = ("asyncio", {"loop_factory": VirtualClockLoop})
+            backend = ("asyncio", {"loop_factory": _new_loop})
             values = [pytest.param(backend, id=pytest.HIDDEN_PARAM)]
             definition.add_marker(pytest.mark.parametrize(_ANYIO, values, scope="module"))
             metafunc.config.stash.setdefault(_CHOSEN, set()).add(definition.nodeid)
@@ -66,14 +77,15 @@ def chosen_for(metafunc: pytest.Metafunc) -> Iterator[None]:
 
 def virtual_time_for(request: pytest.FixtureRequest) -> Iterator[VirtualTime]:
     """Give a test its time; a coroutine test whose loop could not be chosen fails, and is told why."""
-    time = VirtualTime()
     if not inspect.iscoroutinefunction(_function_of(request.node)):
+        time = VirtualTime()
         with time.everywhere():
             yield time
         return
     if _nodeid_without_parameters(request.node) not in request.config.stash.get(_CHOSEN, set()):
         pytest.fail(_why_not(request), pytrace=False)
-    yield time
+    of_another_test = _newest if _newest is not None and _newest.is_closed() else None
+    yield VirtualTime(lambda: None if _newest is of_another_test else _newest)
 
 
 def _why_not(request: pytest.FixtureRequest) -> str:

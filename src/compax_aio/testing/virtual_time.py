@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Coroutine, Iterator
+from collections.abc import Callable, Coroutine, Iterator
 from contextlib import ExitStack, contextmanager
 from typing import Any, TypeVar
 from unittest import mock
@@ -21,10 +21,14 @@ class VirtualTime:
 
     A coroutine test runs on it by itself. In a test that is no coroutine, everything that makes its own event loop
     does, ``asyncio.run`` and ``asyncio.Runner`` without a ``loop_factory``; one loop after the other, time goes on.
+
+    Args:
+        find_loop: Finds the loop of a test that is given one, as soon as it is there.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, find_loop: Callable[[], VirtualClockLoop | None] = lambda: None) -> None:
         self._loop: VirtualClockLoop | None = None
+        self._find_loop = find_loop
 
     def __repr__(self) -> str:
         return f"<VirtualTime {self.now:.3f} s>"
@@ -40,6 +44,7 @@ class VirtualTime:
         try:
             loop = asyncio.get_running_loop()
         except RuntimeError:  # none runs: the last one has kept the time
+            self._loop = self._find_loop() or self._loop
             return 0.0 if self._loop is None else self._loop.time()
         self.check(loop)
         return loop.time()
