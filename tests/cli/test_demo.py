@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import asyncio
 import io
+import json
+import signal
+from collections.abc import Coroutine
+from typing import Any
 
 import pytest
 from rich.console import Console, Group
 
 import compax_aio
-from compax_aio.cli import demo
+from compax_aio.cli import app, demo
+from compax_aio.simulator.clock import VirtualClockLoop
 
 
 def printed(thing: object) -> str:
@@ -50,6 +55,54 @@ async def test_the_demonstration_leaves_nothing_behind_when_it_is_cancelled() ->
     with pytest.raises(asyncio.CancelledError):
         await task
     assert asyncio.all_tasks() == {asyncio.current_task()}
+
+
+@pytest.fixture
+def time_is_virtual(monkeypatch: pytest.MonkeyPatch) -> None:
+    def run(coroutine: Coroutine[Any, Any, Any]) -> Any:
+        with asyncio.Runner(loop_factory=VirtualClockLoop) as runner:
+            return runner.run(coroutine)
+
+    monkeypatch.setattr(asyncio, "run", run)
+
+
+@pytest.mark.usefixtures("bytes_take_no_time", "time_is_virtual")
+def test_the_command_prints_what_each_drive_confirmed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert app.run(["demo"]) == 0
+    _, title, table = capsys.readouterr().out.partition("What the drives confirmed")
+    assert title
+    assert table.count("status") == 9
+
+
+@pytest.mark.usefixtures("bytes_take_no_time", "time_is_virtual")
+def test_the_command_prints_one_document_for_programs(capsys: pytest.CaptureFixture[str]) -> None:
+    assert app.run(["demo", "--json"]) == 0
+    (line,) = capsys.readouterr().out.splitlines()
+    confirmed = json.loads(line)
+    assert [(each["axis"], each["motion"], each["target"]) for each in confirmed[:4]] == [
+        ("x", "home", None),
+        ("y", "home", None),
+        ("z", "home", None),
+        ("x", "move", 240.0),
+    ]
+    assert all(each["reached"] == (each["target"] or 0.0) for each in confirmed)
+
+
+@pytest.mark.usefixtures("bytes_take_no_time")
+def test_a_command_that_is_interrupted_says_that_every_drive_was_stopped(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def run_and_interrupt(coroutine: Coroutine[Any, Any, Any]) -> Any:
+        async def interrupted() -> Any:
+            asyncio.get_running_loop().call_later(2, signal.raise_signal, signal.SIGINT)
+            return await coroutine
+
+        with asyncio.Runner(loop_factory=VirtualClockLoop) as runner:
+            return runner.run(interrupted())
+
+    monkeypatch.setattr(asyncio, "run", run_and_interrupt)
+    assert app.run(["demo"]) == 130
+    assert "STOP went to every drive that moved" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import sys
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Final, Literal
 
 from rich import box
 from rich.console import Console, Group
@@ -21,12 +21,17 @@ from compax_aio.compax.settings import DriveSettings
 from compax_aio.simulator.compax import Knobs, SimulatedDrive
 from compax_aio.simulator.server import serve_loopback, serve_pty, serve_tcp
 
-__all__ = ["main", "run"]
+from .interruption import say_at_end
+from .printing import Printing
+
+__all__ = ["demo", "main", "run"]
 
 _UNIT = "mm"
 _TARGETS = ((240.0, 155.5, -60.0), (80.0, 10.25, 0.0))
 _SPEED_PERCENT = 60
 _BAUDRATE: Literal[0, 9600] = 9600
+
+_INTERRUPTED: Final = "Interrupted: STOP went to every drive that moved, and each acknowledged it."
 
 Watcher = Callable[[Group], None]
 
@@ -40,13 +45,33 @@ class _Round:
     positions: dict[str, float]
 
 
+async def demo(*, printing: Printing = Printing()) -> None:  # noqa: B008 - it is frozen
+    """
+    Home and move three simulated drives at once, on three kinds of line, and watch them.
+
+    One is on a pseudo-terminal, one on TCP, one in memory, with the timing of 9600 baud. No machine is needed, and none
+    is moved. Ctrl-C stops the axes. With `--json` what each drive confirmed is printed at the end.
+
+    ```sh
+    compax demo
+    ```
+    """
+    console = Console(quiet=printing.json, highlight=False)
+    try:
+        rounds = await _carry_out(console, None)
+    except asyncio.CancelledError:
+        say_at_end(_INTERRUPTED)  # as leaving the group has not failed
+        raise
+    printing.show([_document(each, axis) for each in rounds for axis in each.results], _table(rounds))
+
+
 def main() -> int:
     """Run the demonstration; returns the exit code."""
     console = Console()
     try:
         console.print(asyncio.run(run(console)))
     except KeyboardInterrupt:
-        console.print("Interrupted: STOP went to every drive that moved, and each acknowledged it.")
+        console.print(_INTERRUPTED)
         return 130
     except compax_aio.CompaxError as error:
         console.print(Text(f"{type(error).__name__}: {error}", style="red"))
@@ -56,6 +81,10 @@ def main() -> int:
 
 async def run(console: Console, on_frame: Watcher | None = None) -> Table:
     """Home and move all three, and return the closing table; *on_frame* sees the live display as it changes."""
+    return _table(await _carry_out(console, on_frame))
+
+
+async def _carry_out(console: Console, on_frame: Watcher | None) -> list[_Round]:
     async with _simulated_drives() as urls, _connected(urls) as group:
         console.print("Three simulated COMPAX drives, each on a line of its own:")
         for axis, url in urls.items():
@@ -66,7 +95,7 @@ async def run(console: Console, on_frame: Watcher | None = None) -> Table:
             move = group.move_to(x=x, y=y, z=z, speed_percent=_SPEED_PERCENT)
             results = await _watched(console, f"moving to x {x:g}, y {y:g}, z {z:g}", move, on_frame)
             rounds.append(_Round("move", results, await group.positions()))
-        return _table(rounds)
+        return rounds
 
 
 @asynccontextmanager
@@ -120,6 +149,19 @@ async def _follow(bars: Progress, bar: TaskID, move: compax_aio.Move, on_frame: 
         on_frame()
     if move.done() and not move.cancelled() and move.exception() is None:
         bars.update(bar, completed=1.0, state=f"[green]reached, by {move.result().confirmed_by}")
+
+
+def _document(each: _Round, axis: str) -> dict[str, Any]:
+    result = each.results[axis]
+    return {
+        "axis": axis,
+        "motion": each.motion,
+        "target": result.target,
+        "reached": each.positions[axis],
+        "unit": _UNIT,
+        "confirmed_by": result.confirmed_by,
+        "duration_s": result.duration_s,
+    }
 
 
 def _table(rounds: Sequence[_Round]) -> Table:
