@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import asyncio
+import sys
+from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.cli.shelling.person import CTRL_C, CTRL_D, CTRL_X, ENTER, sitting, until
+from prompt_toolkit.application import create_app_session
+from prompt_toolkit.input import create_pipe_input
+from prompt_toolkit.output import DummyOutput
+from tests.cli.shelling.person import CTRL_C, CTRL_D, CTRL_X, ENTER, Person, sitting, until
 from tests.promises.cable import Cable
 
 from compax_aio import CommandRejectedError, Drive, DriveSettings
+from compax_aio.cli.app import app
 from compax_aio.simulator.compax import LogKind
 
 PASTE = "\x1b[200~{}\x1b[201~"
@@ -295,6 +301,57 @@ async def test_a_lost_line_is_told_and_no_motion_waits_for_it() -> None:
         await person.sees("LINE BACK  after", "S001: 0.00")
         await asyncio.sleep(5)
         assert not person.did(LogKind.MOTION_STARTED)
+
+
+async def test_what_is_warned_of_is_told_once_above_the_prompt() -> None:
+    cable = Cable()
+    async with sitting(cable=cable) as person:
+        await cable.pull()
+        await person.sees("LINE LOST  x: the line was lost")
+        await person.sees("warning  x: the line is still lost")
+        assert "warning  x: the line was lost" not in person.seen
+        await cable.plug(person.far)
+        await person.sees("LINE BACK")
+
+
+async def test_a_defect_ends_the_talk_and_stops_the_axis(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def command(self: Drive, text: str) -> str:
+        raise RuntimeError("a defect")
+
+    async def talk() -> None:
+        async with sitting(leaves=False, **SLOW) as person:
+            people.append(person)
+            await person.say("move 500", "on its way")
+            monkeypatch.setattr(Drive, "command", command)
+            person.press("S1" + ENTER)
+
+    people: list[Person] = []
+    with pytest.raises(ExceptionGroup) as ended:
+        await talk()
+    assert isinstance(ended.value.exceptions[0], RuntimeError)
+    assert len(people[0].did(LogKind.MOTION_STOPPED)) == 1
+
+
+async def test_a_drive_that_falls_silent_is_told_with_the_last_that_went_over_the_line() -> None:
+    async with sitting(settings=DriveSettings(reconnect=False)) as person:
+        person.far.power_off()
+        await person.say("S1", "AnswerTimeoutError", "the last that went over the line:", "→ S1")
+        person.far.power_on()
+
+
+@pytest.mark.parametrize("words", [("--no-history", "--poll-s=0"), ("--name", "x")])
+async def test_the_command_talks_where_somebody_sits_at_a_terminal(
+    words: tuple[str, ...], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    for stream in (sys.stdin, sys.stdout):
+        monkeypatch.setattr(stream, "isatty", lambda: True)
+    command, bound, _ = app.parse_args(["shell", "sim://compax", *words])
+    with create_pipe_input() as keyboard, create_app_session(input=keyboard, output=DummyOutput()):
+        keyboard.send_text("S1\rexit\r")
+        await command(*bound.args, **bound.kwargs)
+    assert "Ctrl-X stops the axis" in capsys.readouterr().out
+    assert (tmp_path / "compax" / "shell_history").exists() is ("--name" in words)
 
 
 async def test_motion_typed_before_a_line_is_lost_is_not_sent_after() -> None:

@@ -28,6 +28,7 @@ from .replies import Reply, told_error, told_event, told_move
 from .toolbar import Standing, toolbar
 from .turns import Turns
 from .underway import Underway
+from .warned import Warnings
 from .watching import Watching
 
 __all__ = ["Session"]
@@ -67,13 +68,14 @@ class Session:
         self._standing = Standing(is_open=drive.is_open)
         self._turns = Turns(self._replied, self._failed, self._dropped)
         self._watching = Watching(drive, self._tell)
+        self._warnings = Warnings(self._tell)
         self._asked: list[Order] = []
         self._stop: asyncio.Task[None] | None = None
         self._tasks: asyncio.TaskGroup
 
     async def run(self) -> None:
         """Talk until the person leaves, then stop what was started here."""
-        with self._interrupts_heeded():
+        with self._interrupts_heeded(), self._warnings.instead_of_others():
             async with asyncio.TaskGroup() as tasks:
                 self._tasks = tasks
                 background = [
@@ -267,6 +269,7 @@ class Session:
     async def _tell_events(self) -> None:
         async for event in self._drive.events():
             if isinstance(event, ConnectionLost):
+                self._warnings.note_told(event.reason)
                 self._standing.position = self._standing.status = None
                 self._turns.drop("the line to the drive was lost", lambda order: order.can_move)
             if isinstance(event, Fault):
