@@ -12,8 +12,9 @@ from typing import Any
 import pexpect
 import pytest
 from tests.fakes.commands import Commands
+from tests.promises.cable import Cable, outage
 
-from compax_aio.recording import read_record
+from compax_aio.recording import motion_file, read_record
 from compax_aio.simulator.compax import Knobs, LogKind, SimulatedDrive
 from compax_aio.simulator.server import serve_tcp
 
@@ -184,6 +185,40 @@ def test_a_line_that_cannot_be_opened_leaves_no_file(compax: Commands, path: Pat
     outcome = compax("record", "tcp://127.0.0.1:1", "-o", str(path))
     assert outcome.code == 3
     assert not path.exists()
+
+
+def test_the_display_shows_values_rate_and_a_line_that_is_lost(
+    compax: Commands, path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setenv("TERM", "xterm")
+    far, cable = SimulatedDrive(Knobs(homed=True, position=12.5), name="x"), Cable()
+    compax.loop.run_until_complete(cable.plug(far))
+    compax.after(2.0, lambda: compax.loop.create_task(outage(cable, far, 1.0)))
+    outcome = compax("record", f"x={cable.url}", "-o", str(path), "--seconds", "8")
+    compax.loop.run_until_complete(cable.pull())
+    assert outcome.code == 0
+    assert "/s   position 12.50   target 12.50   following error 0.00" in outcome.err
+    assert "Ctrl-C ends it" in outcome.err
+    assert "the line is lost, and tried again" in outcome.err
+    assert [mark.word for mark in read_record(path).marks] == ["connection lost", "connection restored"]
+
+
+def test_rows_that_are_lost_are_told(
+    compax: Commands, x: SimulatedDrive, path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(motion_file, "_MAX_WAITING", 10)
+    outcome = compax("record", X, "-o", str(path), "--seconds", "3")
+    assert outcome.code == 0
+    assert f"{read_record(path).rows_lost} rows were lost, for the disk was too slow" in outcome.out
+
+
+def test_a_status_value_is_recorded_by_its_number_and_half_of_the_line_is_left(
+    compax: Commands, x: SimulatedDrive, path: Path
+) -> None:
+    outcome = compax("record", X, "-o", str(path), "-q", "S5", "--seconds", "1", "--line-share", "0.5")
+    assert outcome.code == 0
+    assert read_record(path).axes["x"].traces["S5"].unit == "%"
 
 
 @pytest.mark.real_time

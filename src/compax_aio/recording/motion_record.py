@@ -157,6 +157,9 @@ class MotionRecording:
             raise InvalidCommandError(f"{axis!r} is not recorded here; recorded: {', '.join(self._axes)}")
         if value is not None:
             value = check_number("value", value)
+        for each in self._axes.values():
+            self._take_waiting_events(each)  # what happened before stands before it
+
         self._put(self._loop.time(), axis, Kind.MARK, word, value=value, text=text)
 
     async def until_over(self) -> None:
@@ -285,7 +288,7 @@ class MotionRecording:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
         for axis in self._axes.values():
-            self._take_last_events(axis)
+            self._take_waiting_events(axis)
         self._ended_after_s = self.time_s
         ended = Row(self._ended_after_s, "", Kind.RECORD, "ended", self.samples, why)
         try:
@@ -298,8 +301,8 @@ class MotionRecording:
         finally:
             self._thread.shutdown(wait=False)
 
-    def _take_last_events(self, axis: RecordedAxis) -> None:
-        """Note what was told before the end, and not yet taken."""
+    def _take_waiting_events(self, axis: RecordedAxis) -> None:
+        """Note what was told until now, and not yet taken."""
         for event in axis.events.take_waiting():
             self._note_event(axis, event)
 
