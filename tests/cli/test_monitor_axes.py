@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
 from pathlib import Path
 
@@ -25,14 +25,14 @@ from compax_aio.simulator.server import drive_named
 _SETTINGS = DriveSettings(unit="mm")
 
 
-def cell_of(settings: DriveSettings = _SETTINGS, **urls: str) -> Cell:
+def cell_of(urls: Mapping[str, str], settings: DriveSettings = _SETTINGS) -> Cell:
     return Cell([WantedAxis(name, url, settings) for name, url in urls.items()], interval_s=0.2, jog_percent=50.0)
 
 
 @asynccontextmanager
-async def watching(settings: DriveSettings = _SETTINGS, **urls: str) -> AsyncIterator[Cell]:
+async def watching(urls: Mapping[str, str], settings: DriveSettings = _SETTINGS) -> AsyncIterator[Cell]:
     """Watch, until the block is left."""
-    cell = cell_of(settings, **urls)
+    cell = cell_of(urls, settings)
     cell.start()
     try:
         yield cell
@@ -61,7 +61,7 @@ def lines_that_move(name: str) -> list[str]:
 
 
 async def test_watching_sends_nothing_that_moves_or_changes_a_drive() -> None:
-    async with watching(x="sim://compax?name=x&travel_min=-10&travel_max=300") as cell:
+    async with watching({"x": "sim://compax?name=x&travel_min=-10&travel_max=300"}) as cell:
         await asyncio.sleep(5)
         state = cell.axes[0].state
         assert state.travel == (-10.0, 300.0)
@@ -74,7 +74,7 @@ async def test_watching_sends_nothing_that_moves_or_changes_a_drive() -> None:
 
 async def test_an_axis_that_is_not_there_is_tried_again_while_the_others_are_watched() -> None:
     cable = Cable()
-    async with watching(x=cable.url, y="sim://compax?name=y") as cell:
+    async with watching({"x": cable.url, "y": "sim://compax?name=y"}) as cell:
         x, y = cell.axes
         await until(lambda: x.state.attempts == 3)
         assert y.state.phase is Phase.OPEN
@@ -86,7 +86,7 @@ async def test_an_axis_that_is_not_there_is_tried_again_while_the_others_are_wat
 
 
 async def test_a_line_that_cannot_be_opened_is_tried_less_and_less_but_for_ever() -> None:
-    async with watching(x="loop://nobody") as cell:
+    async with watching({"x": "loop://nobody"}) as cell:
         x = cell.axes[0]
         await asyncio.sleep(100)
         assert 10 <= x.state.attempts <= 14
@@ -102,7 +102,7 @@ async def test_a_line_that_cannot_be_opened_is_tried_less_and_less_but_for_ever(
 async def test_a_lost_line_shows_for_how_long_and_comes_back_by_itself() -> None:
     cable, far = Cable(), SimulatedDrive(Knobs(homed=True), name="x")
     await cable.plug(far)
-    async with watching(x=cable.url, y="sim://compax?name=y&homed=1") as cell:
+    async with watching({"x": cable.url, "y": "sim://compax?name=y&homed=1"}) as cell:
         x, y = cell.axes
         await until(lambda: state_of(x) == state_of(y) == "STANDING")
         await cable.pull()
@@ -128,7 +128,7 @@ async def test_a_lost_line_shows_for_how_long_and_comes_back_by_itself() -> None
 async def test_a_line_that_is_not_to_be_opened_again_waits_for_a_word() -> None:
     cable, far = Cable(), SimulatedDrive(name="x")
     await cable.plug(far)
-    async with watching(DriveSettings(reconnect=False), x=cable.url) as cell:
+    async with watching({"x": cable.url}, DriveSettings(reconnect=False)) as cell:
         x = cell.axes[0]
         await until(lambda: x.state.phase is Phase.OPEN)
         await cable.pull()
@@ -142,7 +142,7 @@ async def test_a_line_that_is_not_to_be_opened_again_waits_for_a_word() -> None:
 
 
 async def test_a_fault_is_told_with_its_code_and_goes_when_it_is_acknowledged() -> None:
-    async with watching(x="sim://compax?name=x&homed=1") as cell:
+    async with watching({"x": "sim://compax?name=x&homed=1"}) as cell:
         x = cell.axes[0]
         await until(lambda: state_of(x) == "STANDING")
         x.orders.acknowledge()
@@ -159,19 +159,20 @@ async def test_a_fault_is_told_with_its_code_and_goes_when_it_is_acknowledged() 
 
 async def test_a_fault_that_was_there_before_us_is_named_too() -> None:
     drive_named("x", Knobs()).raise_fault(55)
-    async with watching(x="sim://compax?name=x") as cell:
+    async with watching({"x": "sim://compax?name=x"}) as cell:
         await until(lambda: state_of(cell.axes[0]) == "FAULT E55")
 
 
 async def test_a_jog_is_told_from_its_beginning_to_its_end() -> None:
-    async with watching(x="sim://compax?name=x&homed=1&position=10") as cell:
+    async with watching({"x": "sim://compax?name=x&homed=1&position=10"}) as cell:
         x = cell.axes[0]
         await until(lambda: state_of(x) == "STANDING")
         x.orders.jog(20)
-        x.orders.jog(20)
-        assert "nothing was sent, jog +20 mm is not over" in told(cell)
+        x.orders.jog(20)  # as a key that is held down says it
+        x.orders.home()
+        assert "search for machine zero: nothing was sent, jog +20 mm is not over" in told(cell)
         await until(lambda: state_of(x) == "MOVING")
-        assert cell.moved_from_here == (x,)
+        assert [axis.name for axis in cell.moved_from_here] == ["x"]
         await until(lambda: "jog +20 mm: reached 30.00 mm, confirmed by message" in told(cell))
         assert not cell.moved_from_here
         assert lines_that_move("x") == ["SD50", "PR20$"]
@@ -179,8 +180,23 @@ async def test_a_jog_is_told_from_its_beginning_to_its_end() -> None:
         await until(lambda: "search for machine zero: reached, confirmed by status" in told(cell))
 
 
+async def test_a_jog_in_the_other_direction_stops_the_one_that_runs() -> None:
+    async with watching({"x": "sim://compax?name=x&homed=1"}) as cell:
+        x = cell.axes[0]
+        await until(lambda: state_of(x) == "STANDING")
+        x.orders.jog(500)
+        await until(lambda: state_of(x) == "MOVING")
+        x.orders.jog(-500)
+        await until(lambda: "x" in cell.stops and cell.stops["x"].level is Level.QUIET)
+        assert "jog +500 mm: move_by(500) was stopped at" in told(cell)
+        await asyncio.sleep(5)
+        assert lines_that_move("x") == ["SD50", "PR500$", "STOP"]
+        x.orders.jog(-5)
+        await until(lambda: "jog -5 mm: reached" in told(cell))
+
+
 async def test_what_a_drive_cannot_be_told_is_said_and_not_sent() -> None:
-    async with watching(x="sim://compax?name=x") as cell:
+    async with watching({"x": "sim://compax?name=x"}) as cell:
         x = cell.axes[0]
         await until(lambda: x.state.phase is Phase.OPEN)
         x.orders.jog(1e9)
@@ -189,7 +205,7 @@ async def test_what_a_drive_cannot_be_told_is_said_and_not_sent() -> None:
 
 
 async def test_a_move_that_fails_says_why() -> None:
-    async with watching(x="sim://compax?name=x&travel_max=50") as cell:
+    async with watching({"x": "sim://compax?name=x&travel_max=50"}) as cell:
         x = cell.axes[0]
         await until(lambda: x.state.travel is not None)
         x.orders.jog(100)
@@ -200,8 +216,8 @@ async def test_a_move_that_fails_says_why() -> None:
 
 async def test_stopping_all_goes_to_all_lines_at_once_and_each_is_told_truly() -> None:
     urls = {name: f"sim://compax?name={name}&homed=1" for name in "xyz"}
-    async with watching(DriveSettings(stop_timeout_s=3), **urls) as cell:
-        x, y, _ = cell.axes
+    async with watching(urls, DriveSettings(stop_timeout_s=3)) as cell:
+        x, y, z = cell.axes
         await until(lambda: all(state_of(axis) == "STANDING" for axis in cell.axes))
         x.orders.jog(500)
         y.orders.jog(500)
@@ -210,7 +226,7 @@ async def test_stopping_all_goes_to_all_lines_at_once_and_each_is_told_truly() -
         at = asyncio.get_running_loop().time()
         cell.stop_all()
         cell.stop_all()  # as a key that is held down says it
-        x.orders.jog(1)
+        z.orders.jog(1)
         assert "nothing was sent, a stop is under way" in told(cell)
         await until(lambda: all(stop.level is not Level.WAITING for stop in cell.stops.values()))
         assert cell.stops["x"].text == cell.stops["z"].text == "acknowledged, and the axis stands"
@@ -218,7 +234,7 @@ async def test_stopping_all_goes_to_all_lines_at_once_and_each_is_told_truly() -
         for name in "xz":
             log = [entry for entry in drive_named(name).log if entry.text == "STOP" and entry.kind is LogKind.LINE]
             assert log[0].at - at < 0.05
-        assert cell.moved_from_here == (y,)
+        assert [axis.name for axis in cell.moved_from_here] == ["y"]
         drive_named("y").silent = drive_named("y").deaf = False
         await until(lambda: state_of(y) == "IN DOUBT")
         y.orders.jog(1)
@@ -234,7 +250,7 @@ async def test_stopping_all_goes_to_all_lines_at_once_and_each_is_told_truly() -
 
 async def test_a_stop_that_is_acknowledged_by_an_axis_that_goes_on_is_not_called_a_standstill() -> None:
     settings = DriveSettings(standstill_timeout_s=0.5)
-    async with watching(settings, x="sim://compax?name=x&homed=1&stop_ramp_ms=60000") as cell:
+    async with watching({"x": "sim://compax?name=x&homed=1&stop_ramp_ms=60000"}, settings) as cell:
         x = cell.axes[0]
         await until(lambda: state_of(x) == "STANDING")
         x.orders.jog(5000)
@@ -250,7 +266,7 @@ async def test_leaving_stops_what_was_started_here_and_leaves_alone_what_was_not
     other.move_to(3000, speed_percent=10, on_cancel="detach")
     await asyncio.sleep(1)
     await other.close()
-    cell = cell_of(x="sim://compax?name=x&homed=1", y="sim://compax?name=y", z="sim://compax?name=z")
+    cell = cell_of({"x": "sim://compax?name=x&homed=1", "y": "sim://compax?name=y", "z": "sim://compax?name=z"})
     cell.start()
     x, y, _ = cell.axes
     await until(lambda: state_of(y) == "MOVING" and state_of(x) == "STANDING")
@@ -269,7 +285,7 @@ async def test_leaving_stops_what_was_started_here_and_leaves_alone_what_was_not
 
 
 async def test_leaving_an_axis_that_cannot_be_stopped_says_so() -> None:
-    cell = cell_of(DriveSettings(stop_timeout_s=2, in_doubt_after_s=5), x="sim://compax?name=x&homed=1")
+    cell = cell_of({"x": "sim://compax?name=x&homed=1"}, DriveSettings(stop_timeout_s=2, in_doubt_after_s=5))
     cell.start()
     x = cell.axes[0]
     await until(lambda: state_of(x) == "STANDING")
@@ -283,7 +299,7 @@ async def test_leaving_an_axis_that_cannot_be_stopped_says_so() -> None:
 
 
 async def test_leaving_stops_what_is_in_doubt() -> None:
-    cell = cell_of(DriveSettings(in_doubt_after_s=2), x="sim://compax?name=x&homed=1")
+    cell = cell_of({"x": "sim://compax?name=x&homed=1"}, DriveSettings(in_doubt_after_s=2))
     cell.start()
     x = cell.axes[0]
     await until(lambda: state_of(x) == "STANDING")
@@ -293,14 +309,14 @@ async def test_leaving_stops_what_is_in_doubt() -> None:
     await until(lambda: x.state.doubt is not None or "in doubt" in told(cell))
     drive_named("x").silent = False
     await until(lambda: state_of(x) == "IN DOUBT")
-    assert cell.moved_from_here == (x,)
+    assert [axis.name for axis in cell.moved_from_here] == ["x"]
     await cell.close()
     assert cell.farewells[0].text == "something was in doubt: it was stopped, and stands"
     assert drive_named("x").log.texts(LogKind.MOTION_STOPPED)
 
 
 async def test_closing_is_carried_through_although_it_is_cancelled() -> None:
-    cell = cell_of(x="sim://compax?name=x&homed=1")
+    cell = cell_of({"x": "sim://compax?name=x&homed=1"})
     cell.start()
     await until(lambda: state_of(cell.axes[0]) == "STANDING")
     cell.axes[0].orders.jog(500)
@@ -314,7 +330,7 @@ async def test_closing_is_carried_through_although_it_is_cancelled() -> None:
 
 
 async def test_messages_and_comparators_are_written_down_and_a_flood_of_noise_does_not_push_them_out() -> None:
-    async with watching(x="sim://compax?name=x&homed=1") as cell:
+    async with watching({"x": "sim://compax?name=x&homed=1"}) as cell:
         x = cell.axes[0]
         await until(lambda: state_of(x) == "STANDING")
         x.orders.jog(1)
@@ -328,7 +344,7 @@ async def test_messages_and_comparators_are_written_down_and_a_flood_of_noise_do
 
 
 async def test_a_comparator_that_somebody_has_programmed_is_written_down() -> None:
-    async with watching(x="sim://compax?name=x&homed=1") as cell:
+    async with watching({"x": "sim://compax?name=x&homed=1"}) as cell:
         x = cell.axes[0]
         await until(lambda: x.orders.drive is not None and state_of(x) == "STANDING")
         assert x.orders.drive is not None
@@ -341,14 +357,14 @@ async def test_an_axis_that_does_not_say_its_travel_is_watched_all_the_same(monk
         raise compax_aio.CommandRejectedError("drive rejected 'P90'", sent="P90")
 
     monkeypatch.setattr(compax_aio.Drive, "read_axis", refuse)
-    async with watching(x="sim://compax?name=x&homed=1") as cell:
+    async with watching({"x": "sim://compax?name=x&homed=1"}) as cell:
         await until(lambda: state_of(cell.axes[0]) == "STANDING")
         assert "cannot be read: drive rejected 'P90'" in told(cell)
         assert cell.axes[0].state.travel is None
 
 
 async def test_a_defect_on_one_axis_leaves_the_others_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    async with watching(x="sim://compax?name=x", y="sim://compax?name=y&homed=1") as cell:
+    async with watching({"x": "sim://compax?name=x", "y": "sim://compax?name=y&homed=1"}) as cell:
         x, y = cell.axes
         await until(lambda: state_of(y) == "STANDING" and state_of(x) == "NOT HOMED")
 
@@ -365,7 +381,7 @@ async def test_a_defect_on_one_axis_leaves_the_others_alone(monkeypatch: pytest.
 
 
 async def test_orders_that_fail_are_told() -> None:
-    async with watching(DriveSettings(stop_timeout_s=1, resync_attempts=1), x="sim://compax?name=x") as cell:
+    async with watching({"x": "sim://compax?name=x"}, DriveSettings(stop_timeout_s=1, resync_attempts=1)) as cell:
         x = cell.axes[0]
         await until(lambda: state_of(x) == "NOT HOMED")
         drive_named("x").raise_fault(55)

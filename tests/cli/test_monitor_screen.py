@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
 
 import pytest
@@ -27,7 +27,7 @@ _SETTINGS = DriveSettings(unit="mm", stop_timeout_s=3)
 @pytest.fixture(autouse=True)
 def screen_on_the_loops_clock(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let textual's timers go by the clock of the event loop, which is a virtual one."""
-    monkeypatch.setattr(textual._time, "get_time", lambda: asyncio.get_running_loop().time())  # type: ignore[attr-defined]
+    monkeypatch.setattr(textual._time, "get_time", lambda: asyncio.get_running_loop().time())
 
 
 class Seat:
@@ -45,7 +45,7 @@ class Seat:
         try:
             async with asyncio.timeout(within_s):
                 while not all(text in self.picture() for text in texts):  # noqa: ASYNC110
-                    await asyncio.sleep(0.05)
+                    await asyncio.sleep(0.1)
         except TimeoutError:
             raise AssertionError(f"never on the screen: {texts}\n{self.picture()}") from None
 
@@ -61,10 +61,10 @@ class Seat:
 
 @asynccontextmanager
 async def seated(
-    *, size: tuple[int, int] = (110, 44), asks: bool = True, settings: DriveSettings = _SETTINGS, **urls: str
+    urls: Mapping[str, str], *, size: tuple[int, int] = (110, 44), asks: bool = True
 ) -> AsyncIterator[Seat]:
     """Sit down in front of a monitor of these axes."""
-    wanted = [WantedAxis(name, url, settings) for name, url in urls.items()]
+    wanted = [WantedAxis(name, url, _SETTINGS) for name, url in urls.items()]
     cell = Cell(wanted, interval_s=0.2, jog_percent=50)
     monitor = Monitor(cell, asks_before_motion=asks)
     async with monitor.run_test(size=size) as pilot:
@@ -90,13 +90,13 @@ async def until(condition: Callable[[], object], within_s: float = 100.0) -> Non
 
 
 async def test_all_axes_are_seen_with_what_they_say() -> None:
-    async with seated(**simulated("x", "y", more="&travel_min=-10&travel_max=300")) as seat:
-        await seat.sees("▌ x", "y  ■ STANDING", "position, last minute", "-10 ", " 300", "●homed", "○fault", "/s")
+    async with seated(simulated("x", "y", more="&travel_min=-10&travel_max=300")) as seat:
+        await seat.sees("▌ x", "y  ■ STANDING", "position, 60 s", "-10 ", " 300", "●homed", "○fault", "/s")
         assert "looking only" in seat.picture()
 
 
 async def test_as_long_as_motion_is_off_no_key_sends_anything() -> None:
-    async with seated(**simulated("x")) as seat:
+    async with seated(simulated("x")) as seat:
         await seat.sees("STANDING")
         await seat.press("right", "shift+left", "h", "a", "r", "plus")
         await asyncio.sleep(3)
@@ -107,7 +107,7 @@ async def test_as_long_as_motion_is_off_no_key_sends_anything() -> None:
 
 
 async def test_motion_is_switched_on_by_a_yes_and_by_nothing_else() -> None:
-    async with seated(**simulated("x")) as seat:
+    async with seated(simulated("x")) as seat:
         await seat.sees("STANDING")
         for answer in ("n", "escape", "q"):
             await seat.press("m")
@@ -123,7 +123,7 @@ async def test_motion_is_switched_on_by_a_yes_and_by_nothing_else() -> None:
 
 
 async def test_steps_grow_and_shrink_and_shift_takes_ten() -> None:
-    async with seated(asks=False, **simulated("x")) as seat:
+    async with seated(simulated("x"), asks=False) as seat:
         await seat.sees("STANDING")
         await seat.press("m", "plus", "plus", "minus", "shift+left")
         await until(lambda: moving_lines("x") == ["SD50", "PR-20$"])
@@ -131,7 +131,7 @@ async def test_steps_grow_and_shrink_and_shift_takes_ten() -> None:
 
 
 async def test_machine_zero_is_looked_for_only_after_a_question() -> None:
-    async with seated(asks=False, **simulated("x")) as seat:
+    async with seated(simulated("x"), asks=False) as seat:
         await seat.sees("STANDING")
         await seat.press("m", "h")
         await seat.sees("Let x find machine zero?")
@@ -143,7 +143,7 @@ async def test_machine_zero_is_looked_for_only_after_a_question() -> None:
 
 
 async def test_space_stops_all_axes_while_one_moves() -> None:
-    async with seated(asks=False, **simulated("x", "y")) as seat:
+    async with seated(simulated("x", "y"), asks=False) as seat:
         await seat.sees("y  ■ STANDING")
         seat.monitor.step = 500.0
         await seat.press("m", "right")
@@ -161,7 +161,7 @@ async def test_space_stops_all_axes_while_one_moves() -> None:
 
 @pytest.mark.parametrize("keys", [("m",), ("question_mark",), ("q",)], ids=["question", "help", "leaving?"])
 async def test_space_stops_all_in_every_dialog_and_closes_it(keys: tuple[str, ...]) -> None:
-    async with seated(**simulated("x", "y")) as seat:
+    async with seated(simulated("x", "y")) as seat:
         await seat.sees("y  ■ STANDING")
         seat.monitor.cell.axes[0].orders.jog(500)
         await seat.sees("x  ◆ MOVING")
@@ -173,7 +173,7 @@ async def test_space_stops_all_in_every_dialog_and_closes_it(keys: tuple[str, ..
 
 
 async def test_a_yes_that_comes_after_a_stop_moves_nothing() -> None:
-    async with seated(asks=False, **simulated("x")) as seat:
+    async with seated(simulated("x"), asks=False) as seat:
         await seat.sees("STANDING")
         await seat.press("m", "h", "space", "y")
         await seat.sees("STOP x  ■ acknowledged")
@@ -181,7 +181,7 @@ async def test_a_yes_that_comes_after_a_stop_moves_nothing() -> None:
 
 
 async def test_a_stop_that_is_not_acknowledged_is_said_to_be_none() -> None:
-    async with seated(**simulated("x", "y")) as seat:
+    async with seated(simulated("x", "y")) as seat:
         await seat.sees("y  ■ STANDING")
         drive_named("x").silent = drive_named("x").deaf = True
         await seat.press("space")
@@ -193,7 +193,7 @@ async def test_a_stop_that_is_not_acknowledged_is_said_to_be_none() -> None:
 
 
 async def test_s_stops_the_axis_that_is_chosen_and_no_other() -> None:
-    async with seated(**simulated("x", "y", "z")) as seat:
+    async with seated(simulated("x", "y", "z")) as seat:
         await seat.sees("z  ■ STANDING")
         await seat.press("k", "j", "down", "down", "up", "s")
         await seat.sees("STOP y  ■ acknowledged")
@@ -203,7 +203,7 @@ async def test_s_stops_the_axis_that_is_chosen_and_no_other() -> None:
 
 
 async def test_a_fault_on_one_axis_is_seen_named_and_acknowledged() -> None:
-    async with seated(**simulated("x", "y")) as seat:
+    async with seated(simulated("x", "y")) as seat:
         await seat.sees("y  ■ STANDING")
         drive_named("x").raise_fault(55)
         await seat.sees("x  ▲ FAULT E55", "emergency stop: release the emergency stop", "▲fault", "y  ■ STANDING")
@@ -216,7 +216,7 @@ async def test_a_fault_on_one_axis_is_seen_named_and_acknowledged() -> None:
 async def test_a_lost_line_is_told_with_old_values_and_comes_back() -> None:
     cable, far = Cable(), SimulatedDrive(Knobs(homed=True, position=12.5), name="x")
     await cable.plug(far)
-    async with seated(x=cable.url, **simulated("y")) as seat:
+    async with seated({"x": cable.url, **simulated("y")}) as seat:
         await seat.sees("x  ■ STANDING", "y  ■ STANDING")
         await cable.pull()
         await seat.sees("x  ▲ LINE LOST 12 s", "it may move", "12 s old", "y  ■ STANDING")
@@ -229,7 +229,7 @@ async def test_a_lost_line_is_told_with_old_values_and_comes_back() -> None:
 
 async def test_the_screen_opens_although_an_axis_is_not_there_and_c_tries_it_again() -> None:
     cable = Cable()
-    async with seated(x=cable.url, **simulated("y")) as seat:
+    async with seated({"x": cable.url, **simulated("y")}) as seat:
         await seat.sees("x  ▲ NOT REACHABLE", "(c: now)", "nobody listens", "y  ■ STANDING", "--")
         await asyncio.sleep(30)
         await cable.plug(SimulatedDrive(Knobs(homed=True), name="x"))
@@ -239,7 +239,7 @@ async def test_the_screen_opens_although_an_axis_is_not_there_and_c_tries_it_aga
 
 
 async def test_a_drive_in_doubt_is_reconciled_after_a_question() -> None:
-    async with seated(**simulated("x")) as seat:
+    async with seated(simulated("x")) as seat:
         await seat.sees("x  ■ STANDING")
         drive_named("x").silent = drive_named("x").deaf = True
         await seat.press("s")
@@ -255,7 +255,7 @@ async def test_a_drive_in_doubt_is_reconciled_after_a_question() -> None:
 
 
 async def test_q_asks_if_something_moves_that_was_started_here_and_stops_it() -> None:
-    async with seated(**simulated("x", "y")) as seat:
+    async with seated(simulated("x", "y")) as seat:
         await seat.sees("x  ■ STANDING")
         seat.monitor.cell.axes[0].orders.jog(500)
         await seat.sees("x  ◆ MOVING")
@@ -274,7 +274,7 @@ async def test_q_asks_if_something_moves_that_was_started_here_and_stops_it() ->
 
 
 async def test_q_leaves_at_once_if_nothing_moves_and_sends_nothing() -> None:
-    async with seated(**simulated("x")) as seat:
+    async with seated(simulated("x")) as seat:
         await seat.sees("x  ■ STANDING")
         await seat.press("q")
         await until(lambda: seat.monitor.cell.farewells)
@@ -282,7 +282,7 @@ async def test_q_leaves_at_once_if_nothing_moves_and_sends_nothing() -> None:
 
 
 async def test_ctrl_c_stops_and_leaves_without_asking_also_from_a_dialog_and_twice() -> None:
-    async with seated(**simulated("x")) as seat:
+    async with seated(simulated("x")) as seat:
         await seat.sees("x  ■ STANDING")
         seat.monitor.cell.axes[0].orders.jog(500)
         await seat.sees("x  ◆ MOVING")
@@ -298,7 +298,7 @@ async def test_ctrl_c_stops_and_leaves_without_asking_also_from_a_dialog_and_twi
 
 async def test_everything_has_its_place_on_eighty_columns_and_twenty_four_lines() -> None:
     urls = simulated("x", "y", "z", more="&travel_min=-10&travel_max=300")
-    async with seated(size=(80, 24), **urls) as seat:
+    async with seated(urls, size=(80, 24)) as seat:
         await seat.sees("x  ■ STANDING", "y  ■ STANDING", "z  ■ STANDING", "space STOP ALL", "quit", "0.00 mm")
         lines = seat.picture().splitlines()
         assert len(lines) == 24
@@ -308,13 +308,13 @@ async def test_everything_has_its_place_on_eighty_columns_and_twenty_four_lines(
         assert "A stop from software is no emergency" in seat.picture()
         await seat.press("escape")
         await seat.pilot.resize_terminal(120, 50)
-        await seat.sees("actual position", "following error")
+        await seat.sees("mm  position", "following error")
         await seat.pilot.resize_terminal(40, 12)
         await seat.sees("STOP ALL", "x  ■ STANDING")
 
 
 async def test_many_axes_scroll_to_the_one_that_is_chosen() -> None:
-    async with seated(size=(80, 24), **simulated(*"abcdefghi")) as seat:
+    async with seated(simulated(*"abcdefghi"), size=(80, 24)) as seat:
         await seat.sees("a  ■ STANDING")
         assert "i  ■" not in seat.picture()
         await seat.press(*["j"] * 8)
@@ -322,7 +322,7 @@ async def test_many_axes_scroll_to_the_one_that_is_chosen() -> None:
 
 
 async def test_the_log_is_looked_back_in_by_keys() -> None:
-    async with seated(size=(80, 24), **simulated("x", "y", "z")) as seat:
+    async with seated(simulated("x", "y", "z"), size=(80, 24)) as seat:
         await seat.sees("z  ■ STANDING")
         for number in range(60):
             seat.monitor.cell.diary.add("", f"line {number}")
@@ -341,7 +341,7 @@ async def test_the_log_is_looked_back_in_by_keys() -> None:
 
 
 async def test_nobody_can_put_the_monitor_to_sleep_or_call_what_is_not_its_own() -> None:
-    async with seated(**simulated("x")) as seat:
+    async with seated(simulated("x")) as seat:
         await seat.sees("STANDING")
         await seat.press("ctrl+p", "ctrl+z", "tab", "enter")
         assert len(seat.monitor.screen_stack) == 1
@@ -353,7 +353,7 @@ async def test_a_defect_of_the_screen_is_kept_for_whoever_runs_it(monkeypatch: p
         raise RuntimeError("no such luck")
 
     with pytest.raises(RuntimeError, match="no such luck"):  # noqa: PT012
-        async with seated(**simulated("x")) as seat:
+        async with seated(simulated("x")) as seat:
             monkeypatch.setattr(Monitor, "_show_head", fail)
             await until(lambda: seat.monitor.defect is not None)
     assert seat.monitor._exit_renderables == []

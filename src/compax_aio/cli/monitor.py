@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import sys
 from pathlib import Path
@@ -23,9 +24,9 @@ __all__ = ["monitor"]
 
 async def monitor(
     *lines: Annotated[str, Parameter(name="URL")],
-    settings: Annotated[tuple[str, ...], Parameter(env_var="COMPAX_SETTINGS", negative=())] = (),
+    settings: Annotated[tuple[str, ...], Parameter(env_var="COMPAX_SETTINGS", negative=(), show_default=False)] = (),
     interval: float = 0.2,
-    allow_motion: Annotated[bool, Parameter(negative=())] = False,
+    allow_motion: Annotated[bool, Parameter(negative=(), show_default=False)] = False,
     step: float = 1.0,
     jog_speed: float = 10.0,
     trace: Path | None = None,
@@ -37,12 +38,11 @@ async def monitor(
     it never starts a motion by itself. `space` stops all axes, whatever is on the screen. Leaving it (`q`, Ctrl-C)
     stops what was started from it, and leaves alone what was not. `?` shows all keys.
 
-    Examples:
-        compax monitor tcp://192.168.1.50:4001
-
-        compax monitor x=serial:///dev/ttyUSB0 y=serial:///dev/ttyUSB1 --settings x=x.toml --settings y=y.toml
-
-        compax monitor x=sim://compax y=sim://compax
+    ```sh
+    compax monitor tcp://192.168.1.50:4001
+    compax monitor x=serial:///dev/ttyUSB0 y=serial:///dev/ttyUSB1 --settings x=x.toml --settings y=y.toml
+    compax monitor x=sim://compax y=sim://compax
+    ```
 
     Args:
         lines: Line of a drive, or NAME=URL, such as `x=tcp://192.168.1.50:4001`; one for each axis.
@@ -74,6 +74,7 @@ async def monitor(
     error = next((each.error for each in cell.farewells if each.error is not None), None)
     if error is not None:
         return exit_code_of(error)
+    _expect_no_signal()
     return INTERRUPTED if interrupted else OK
 
 
@@ -90,6 +91,13 @@ def _expect_terminal() -> None:
             "the monitor needs a terminal for its screen and its keys, and this is none",
             hint="for programs and logs use `compax status URL --watch --json`",
         )
+
+
+def _expect_no_signal() -> None:
+    """Go on with a cancellation, which is how signals end a command: the library of the screen keeps it to itself."""
+    task = asyncio.current_task()
+    if task is not None and task.cancelling():
+        raise asyncio.CancelledError
 
 
 def _say_goodbye(farewells: tuple[Farewell, ...]) -> None:

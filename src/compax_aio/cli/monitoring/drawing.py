@@ -111,7 +111,7 @@ def _written(axis: AxisState, quantity: str, unit: str | None) -> str:
 def draw_place(axis: AxisState, now: float) -> Text:
     """Draw what stands under the large digits."""
     old = _age(axis, "position", now)
-    return Text.assemble((f"{axis.unit}  actual position", _LABEL), (f"  {old}" if old else "", "bold " + _OLD))
+    return Text.assemble((f"{axis.unit}  position", _LABEL), (f"  {old}" if old else "", "bold " + _OLD))
 
 
 def draw_facts(axis: AxisState, now: float) -> Text:
@@ -129,21 +129,24 @@ def draw_facts(axis: AxisState, now: float) -> Text:
 
 
 def draw_trends(axis: AxisState, now: float, width: int) -> Text:
-    """Draw position and following error over the last minute, each with its lowest and highest value."""
+    """Draw position and size of the following error over the last minute, with the range of the one and the other."""
+    decimals = axis.decimals
+    where, error = axis.position_trend.extent(now), axis.error_trend.extent(now)
+    extent = "" if where is None else f"{where[0]:.{decimals}f} … {where[1]:.{decimals}f}"
+    largest = "" if error is None else f"up to {max(map(abs, error)):.{decimals}f}"
     return Text("\n").join(
         [
-            _trend("position, last minute", axis.position_trend, axis.decimals, now, width),
+            between(Text("position, 60 s", _LABEL), Text(extent, _LABEL), width),
             Text(sparkline(axis.position_trend.columns(now, width)), _TREND),
-            _trend("following error", axis.error_trend, axis.decimals, now, width),
-            Text(sparkline(axis.error_trend.columns(now, width)), _ERROR_TREND),
+            between(Text("following error, 60 s", _LABEL), Text(largest, _LABEL), width),
+            Text(_sizes(axis.error_trend, now, width), _ERROR_TREND),
         ]
     )
 
 
-def _trend(label: str, trend: Trend, decimals: int, now: float, width: int) -> Text:
-    extent = trend.extent(now)
-    span = "" if extent is None else f"{extent[0]:.{decimals}f} … {extent[1]:.{decimals}f}"
-    return between(Text(label, _LABEL), Text(span, _LABEL), width)
+def _sizes(trend: Trend, now: float, width: int) -> str:
+    """Draw how large a quantity was, whatever its sign."""
+    return sparkline([None if value is None else abs(value) for value in trend.columns(now, width)])
 
 
 def draw_bar(axis: AxisState, now: float, width: int) -> Text:
@@ -213,7 +216,7 @@ def draw_compact(axis: AxisState, now: float, width: int) -> Text:
         ("  pos ", _LABEL),
         (sparkline(axis.position_trend.columns(now, half if not bar.plain else half // 2)), _TREND),
         ("  err ", _LABEL),
-        (sparkline(axis.error_trend.columns(now, half if not bar.plain else half // 2)), _ERROR_TREND),
+        (_sizes(axis.error_trend, now, half if not bar.plain else half // 2), _ERROR_TREND),
         "  ",
         bar,
     )

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from compax_aio import Drive, Move
-from compax_aio.errors import CompaxError, MoveInDoubtError, MoveTimeoutError
+from compax_aio.errors import CompaxError, MoveInDoubtError, MoveStoppedError, MoveTimeoutError
 
 from .diary import Diary
 from .levels import Level
@@ -48,6 +48,8 @@ class Orders:
         self._diary = diary
         self._jog_percent = jog_percent
         self._move: Move | None = None
+        self._jogs: float | None = None
+        """By how much a jog moves that is not over."""
         self._stopping: asyncio.Task[None] | None = None
         self._tasks: set[asyncio.Task[None]] = set()
         self._may_have_left_moving = False
@@ -73,15 +75,20 @@ class Orders:
     # Moving ---------------------------------------------------------------------------------------------------------
 
     def jog(self, distance: float) -> None:
-        """Move by *distance*, if nothing moves that was started here."""
+        """Move by *distance*; while a jog runs, the same direction does nothing, and the other one stops the axis."""
+        if self._jogs is not None:
+            if self._jogs * distance < 0:
+                self.stop()
+            return
         what = f"jog {distance:+g} {self._state.unit}"
-        self._begin(what, lambda drive: drive.move_by(distance, speed_percent=self._jog_percent))
+        if self._begin(what, lambda drive: drive.move_by(distance, speed_percent=self._jog_percent)):
+            self._jogs = distance
 
     def home(self) -> None:
         """Find machine zero, if nothing moves that was started here."""
         self._begin("search for machine zero", lambda drive: drive.home())
 
-    def _begin(self, what: str, start: Callable[[Drive], Move]) -> None:
+    def _begin(self, what: str, start: Callable[[Drive], Move]) -> bool:
         drive = self.drive
         if drive is None or not drive.is_open:
             self._tell(f"{what}: nothing was sent, there is no line", Level.ATTENTION)
@@ -94,16 +101,18 @@ class Orders:
                 move = start(drive)
             except CompaxError as error:
                 self._tell(f"{what}: {self._plain(error)}", Level.ATTENTION)
-                return
+                return False
             self._move, self._state.own_motion = move, what
             self._tell(f"{what}: begun here", Level.ACTIVE)
             self._spawn(self._see_to_its_end(move, what))
+            return True
+        return False
 
     async def _see_to_its_end(self, move: Move, what: str) -> None:
         try:
             await asyncio.wait([move])
         finally:
-            self._move = self._state.own_motion = None
+            self._move = self._jogs = self._state.own_motion = None
             self._state.own_ended_at = self._now()
         error = None if move.cancelled() else move.exception()
         if error is not None:
@@ -116,8 +125,8 @@ class Orders:
             self._tell(f"{what}: reached{where}, confirmed by {result.confirmed_by}", Level.ACTIVE)
 
     def _plain(self, error: BaseException) -> str:
-        """Say an error to somebody who knows of which axis it is."""
-        return str(error).removeprefix(f"{self._state.name}: ")
+        """Say an error to somebody who knows of which axis it is, and who has stopped it."""
+        return error.what if isinstance(error, MoveStoppedError) else str(error).removeprefix(f"{self._state.name}: ")
 
     # Stopping -------------------------------------------------------------------------------------------------------
 

@@ -56,9 +56,10 @@ class AxisPanel(Vertical):
     AxisPanel .numbers { height: 4; }
     AxisPanel .left { width: 33; padding-left: 2; }
     AxisPanel Digits { width: 31; color: #f2f6fa; text-style: bold; }
+    AxisPanel .place { height: 1; }
     AxisPanel .old { color: #66727f; }
-    AxisPanel .facts { width: 38; text-wrap: nowrap; text-overflow: ellipsis; }
-    AxisPanel .trends { width: 1fr; padding-right: 1; }
+    AxisPanel .facts { width: 38; height: 4; text-wrap: nowrap; text-overflow: ellipsis; }
+    AxisPanel .trends { width: 1fr; height: 4; padding-right: 1; }
     AxisPanel .bar { height: 1; padding: 0 2; }
     AxisPanel .lamps { height: 1; }
     AxisPanel .compact { display: none; height: 2; }

@@ -21,6 +21,7 @@ from .diary import Entry
 from .drawing import COLOURS, between
 from .levels import Level
 from .panel import AxisPanel, Drawn
+from .state import Phase
 from .steps import LARGE, next_step
 
 __all__ = ["Monitor"]
@@ -60,10 +61,12 @@ class Monitor(App[bool]):
     ModalScreen { background: #000000 60%; }
     #head { dock: top; height: 1; background: #34465c; color: #f2f6fa; }
     #head.motion { background: #e8b130; color: #0d1117; }
-    #axes { height: auto; max-height: 1fr; background: #0d1117; scrollbar-size-vertical: 1; }
+    #axes { height: auto; max-height: 1fr; background: #0d1117; scrollbar-size-vertical: 1;
+        scrollbar-color: #34465c; scrollbar-background: #0d1117; }
     #stops { height: auto; max-height: 40%; background: #161d27; display: none; padding: 0 1; }
     #stops.shown { display: block; }
-    #log { height: 1fr; min-height: 3; background: #0d1117; padding: 0 1; scrollbar-size-vertical: 1; }
+    #log { height: 1fr; min-height: 3; background: #0d1117; padding: 0 1; scrollbar-size-vertical: 1;
+        scrollbar-color: #34465c; scrollbar-background: #0d1117; }
     #keys { dock: bottom; height: auto; background: #222c39; padding: 0 1; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -185,11 +188,24 @@ class Monitor(App[bool]):
         keys = [("s", "stop"), ("↑↓", "axis"), ("m", "motion off" if self.is_motion_on else "motion on")]
         if self.is_motion_on:
             keys += [("←→", "jog"), ("+-", "step"), ("h", "home")]
-        keys += [("a", "acknowledge"), ("r", "reconcile"), ("c", "connect"), ("?", "help"), ("q", "quit")]
+        keys += [(key, meaning) for key, meaning, is_wanted in self._keys_for_trouble() if is_wanted]
+        keys += [("?", "help"), ("q", "quit")]
         line = Text.assemble((" space STOP ALL ", f"bold #0d1117 on {COLOURS[Level.ALARM]}"))
         for key, meaning in keys:
             line.append("  ").append(key, "bold #f2f6fa").append(f"\u00a0{meaning}", "#9fb1c1")
         return line
+
+    def _keys_for_trouble(self) -> tuple[tuple[str, str, bool], ...]:
+        """Return the keys that do something only in trouble, and whether the chosen axis is in it."""
+        state = self._axis.state
+        status = state.status(asyncio.get_running_loop().time())
+        has_error = status is not None and not (status.no_fault and status.no_warning)
+        is_tried_by_key = state.phase in {Phase.UNREACHABLE, Phase.ENDED}
+        return (
+            ("a", "acknowledge", has_error),
+            ("r", "reconcile", state.doubt is not None),
+            ("c", "connect", is_tried_by_key),
+        )
 
     # Choosing -------------------------------------------------------------------------------------------------------
 
@@ -275,11 +291,7 @@ class Monitor(App[bool]):
         axis = self._axis
         if self._may_move("search for machine zero"):
             text = f"Let {axis.name} find machine zero? It moves until it has found it."
-            self._ask(_Asked(f"home {axis.name}", text), lambda: self._home(axis))
-
-    def _home(self, axis: MonitoredAxis) -> None:
-        if self.is_motion_on:
-            axis.orders.home()
+            self._ask(_Asked(f"home {axis.name}", text), axis.orders.home)
 
     # What else is asked of a drive ----------------------------------------------------------------------------------
 
