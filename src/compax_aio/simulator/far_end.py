@@ -201,7 +201,7 @@ class FarEnd:
             self._is_powered = False
             self.device.power_off()
         elif kind.name == "unplug":
-            self._do(self.outlet.unplug())
+            self._do(self.outlet.unplug)
         elif kind.name == "cut":
             self._on_cut()
 
@@ -222,7 +222,7 @@ class FarEnd:
             self._say("the power is back")
             self.device.power_on()
         elif kind.name == "unplug" and not self.outlet.is_plugged:
-            self._do(self._plug())
+            self._do(self._plug)
 
     def _answer_so(self, kind: FaultKind, amount_s: float) -> None:
         if kind.name == "late":
@@ -246,7 +246,7 @@ class FarEnd:
 
     def _on_cut(self) -> None:
         self._say("the line is cut")
-        self._do(self._replug())
+        self._do(self._replug)
 
     async def _replug(self) -> None:
         await self.outlet.unplug()
@@ -256,10 +256,10 @@ class FarEnd:
         await self.outlet.plug()
         self._say(f"plugged in: {self.outlet.url}")
 
-    def _do(self, work: Awaitable[None]) -> None:
+    def _do(self, work: Callable[[], Awaitable[None]]) -> None:
         async def told() -> None:
             try:
-                await work
+                await work()
             except CompaxError as error:
                 self._say(f"it cannot be plugged in: {error}")
 
