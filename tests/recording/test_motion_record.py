@@ -165,6 +165,13 @@ async def test_a_person_can_mark_what_happens(path: Path) -> None:
     assert (second.word, second.axis) == ("light", "x")
 
 
+async def test_what_happened_before_a_mark_stands_before_it(path: Path) -> None:
+    async with bench() as (drive, _), record(drive, path) as recording:
+        await drive.move_to(10)
+        recording.mark("clamp closed")
+    assert words(read_record(path))[-2:] == ["reached", "clamp closed"]
+
+
 async def test_a_stop_a_fault_and_a_lost_line_are_marked(path: Path) -> None:
     async with (
         connected(DriveSettings(reconnect_first_s=0.1)) as (drive, far, cable),
