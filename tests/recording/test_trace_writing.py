@@ -7,6 +7,8 @@ import asyncio
 import errno
 import logging
 import os
+import signal
+import subprocess
 import sys
 import threading
 from collections.abc import Callable
@@ -23,7 +25,7 @@ from compax_aio.link.contract import Lane
 from compax_aio.link.taps import TAPS, Asked, Ended, Lost, Noticed, Opened, Opening, Ready, Received, Refused, Sent, Way
 from compax_aio.recording import conversations, read_trace, record_trace, trace_writing
 from compax_aio.recording.own_thread import OwnThread
-from compax_aio.recording.trace_entries import LineMade, Missing, SessionBegun, SessionEnded
+from compax_aio.recording.trace_entries import Cut, LineMade, Missing, SessionBegun, SessionEnded
 from compax_aio.recording.trace_file import TraceFile, older_file
 from compax_aio.recording.trace_writing import TraceRecorder
 
@@ -436,3 +438,56 @@ def test_a_job_that_is_cancelled_before_its_turn_is_not_done() -> None:
     assert isinstance(failing.exception(20), ZeroDivisionError)
     thread.shutdown()
     assert not done
+
+
+def test_a_disk_that_takes_half_of_a_batch_is_written_to_again_from_a_new_line(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = TraceFile(path, 1 << 20, SessionBegun("now", "test"))
+    file.open()
+    file.write([(0.0, "x", LineMade("compax")), (0.1, "x", Opened())])
+    really = os.write
+
+    def half(descriptor: int, data: memoryview) -> int:
+        really(descriptor, data[:10])
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "write", half)
+    with pytest.raises(OSError, match="space"):
+        file.write([(0.2, "x", Lost())])
+    monkeypatch.setattr(os, "write", really)
+    file.write([(0.3, "x", Opened())])
+    file.close()
+    assert [type(fact) for fact in facts(path)] == [
+        SessionBegun, LineMade, Opened, Cut, SessionBegun, LineMade, Opened,
+    ]  # fmt: skip
+    (told,) = conversations(path)
+    assert told.session == 1
+
+
+KILLED = """
+import asyncio, os, signal, sys
+import compax_aio
+from compax_aio.recording import record_trace
+
+async def main():
+    async with record_trace(sys.argv[1]), compax_aio.connect("sim://compax", name="x") as drive:
+        for _ in range(200):
+            await drive.position()
+        await asyncio.sleep(0.5)
+        await drive.position()
+        os.kill(os.getpid(), signal.SIGKILL)
+
+asyncio.run(main())
+"""
+
+
+@pytest.mark.real_time
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")
+def test_a_program_that_is_killed_leaves_all_but_its_last_tenth_of_a_second(path: Path) -> None:
+    ended = subprocess.run([sys.executable, "-c", KILLED, path], check=False, timeout=60)
+    assert ended.returncode == -signal.SIGKILL
+    asked = [fact for fact in facts(path, Asked) if isinstance(fact, Asked) and fact.text == "S1"]
+    assert len(asked) >= 200
+    (told,) = conversations(path)
+    assert not told.is_ended

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from datetime import datetime
 from typing import Any, Final
 
 from rich.text import Text
@@ -30,7 +31,7 @@ from ..link.taps import (
 from ..link.wire import readable
 from ..recording.trace_entries import Cut, LineMade, Missing, SessionBegun, SessionEnded, TraceEntry
 
-__all__ = ["HEADING", "Rows"]
+__all__ = ["HEADING", "Rows", "begun_at"]
 
 _BYTES_SHOWN: Final = 200
 _WIDEST_DATA: Final = 36
@@ -80,8 +81,6 @@ class Rows:
         self._row: _Row | None = None
         self._before: float | None = None
         self._asked: dict[tuple[str, int], tuple[float, str]] = {}
-        self._told: str | None = None
-        """What the last event has told, which need not be told again."""
 
     def take(self, entry: TraceEntry) -> Iterator[Text]:
         """Take an entry; give the rows that are complete by it."""
@@ -91,7 +90,6 @@ class Rows:
         if row is not None:
             yield from self.end()
             self._row = row
-            self._told = None
         else:
             yield from self._remark(entry)
 
@@ -152,11 +150,10 @@ class Rows:
                 return
             case Noticed(event=event, details=details):
                 remark = _event(event, details or {})
-                self._told = event
             case Ended(number=number, how=how, text=answer):
                 _, asked = self._asked.pop((entry.line, number), (0.0, f"no. {number}"))
-                if how == self._told:
-                    return
+                if not (how.endswith("Error") or how == "cancelled"):
+                    return  # it was noticed, and told by that
                 remark = _ending(asked, how, answer)
             case _:
                 return
@@ -187,7 +184,7 @@ def _plainly(fact: Any) -> tuple[str, str] | None:  # noqa: C901, PLR0911, PLR09
     match fact:
         case SessionBegun(begun=begun, by=by, part=part):
             goes_on = " goes on here" if part > 1 else ""
-            return f"session of {escaped(begun)}, {escaped(by)}{goes_on}", "bold"
+            return f"session of {begun_at(begun)}, {escaped(by)}{goes_on}", "bold"
         case LineMade(device=device):
             return f"a line{f' to a device of the kind {escaped(device)}' if device else ''}", "dim"
         case Opening(url=url):
@@ -215,6 +212,14 @@ def _plainly(fact: Any) -> tuple[str, str] | None:  # noqa: C901, PLR0911, PLR09
     return None
 
 
+def begun_at(begun: str) -> str:
+    """Write when a session began, for people: to the second."""
+    try:
+        return datetime.fromisoformat(begun).isoformat(" ", "seconds")
+    except ValueError:
+        return escaped(begun)
+
+
 def _event(event: str, details: Any) -> tuple[str, str]:
     """Say an event in words, with what is not seen from the bytes."""
     words = _words(event)
@@ -229,11 +234,9 @@ def _event(event: str, details: Any) -> tuple[str, str]:
 
 
 def _ending(asked: str, how: str, answer: str | None) -> tuple[str, str]:
-    if how.endswith("Error"):
-        return f"{escaped(asked)!r} failed: {how}: {escaped(answer or '')}", "red"
     if how == "cancelled":
         return f"{escaped(asked)!r} was given up by who had asked", "yellow"
-    return f"{escaped(asked)!r} ended: {_words(how)}", "dim"
+    return f"{escaped(asked)!r} failed: {escaped(how)}: {escaped(answer or '')}", "red"
 
 
 def _words(name: str) -> str:

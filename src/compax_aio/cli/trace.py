@@ -22,6 +22,7 @@ from ..recording.trace_reading import Conversation, conversations, read_trace
 from ..simulator.hunt.recorded import Outcome, Verdict
 from ..simulator.hunt.traces import check_drive
 from ..simulator.smc_hunt.traces import check_party_line
+from .conversing import begun_at
 from .files import reading
 from .interruption import moves_nothing
 from .printing import Printing
@@ -184,7 +185,7 @@ def _session_for_people(session: SessionInTrace) -> Iterator[RenderableType]:
         "broken off": "; not ended: the program was killed, or still records",
     }[session.ending]
     yield Text(
-        f"session {session.session}, begun {escaped(session.begun)} by {escaped(session.by)}, "
+        f"session {session.session}, begun {begun_at(session.begun)} by {escaped(session.by)}, "
         f"{session.lasted_s:.3f} s{ending}"
     )
     if not session.has_beginning:

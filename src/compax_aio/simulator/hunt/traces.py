@@ -242,7 +242,7 @@ class _Drive:
         for line in self.turns.lines:
             data = self.line.wire[line.index].data
             if line.is_frame:
-                if frame_length(data[0]) != len(data):
+                if frame_length(data[0]) != len(data) or not line.text.endswith(")"):  # with what it means
                     yield self.line.at(line.index, f"{line.text!r} is no frame")
             elif not data.endswith(COMMAND_END):
                 yield self.line.at(line.index, f"{line.text!r} has no end")
