@@ -148,6 +148,7 @@ async def test_power_comes_back_after_a_while_or_when_it_is_undone(
     faults.power_cycle(off_s=None)
     await asyncio.sleep(60)
     faults.undo()
+    faults.undo()
     assert _powers(simulated_drive) == powers
 
 

@@ -131,10 +131,12 @@ def test_the_loops_of_the_project_stay_as_they_are(pytester: pytest.Pytester) ->
     pytester.makeconftest(
         """
 import asyncio
+import pytest
 
 class TheirLoop(asyncio.SelectorEventLoop):
     pass
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_asyncio_loop_factories(config, item):
     return {"theirs": TheirLoop, "other": asyncio.SelectorEventLoop}
 """
@@ -283,6 +285,7 @@ async def test_it(simulated_drive, faults, virtual_time):
 async def test_well(simulated_drive, virtual_time):
     await application(simulated_drive.url)
 """,
+        "-rP",
         mode="auto",
     )
     result.assert_outcomes(failed=1, passed=1)

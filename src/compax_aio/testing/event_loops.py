@@ -58,7 +58,7 @@ def chosen_for(metafunc: pytest.Metafunc) -> Iterator[None]:
     if _ANYIO in metafunc.fixturenames:
         if not any(_ANYIO in _names_of(mark) for mark in definition.iter_markers("parametrize")):
             backend = ("asyncio", {"loop_factory": _new_loop})
-            values = [pytest.param(backend, id=pytest.HIDDEN_PARAM)]
+            values = [pytest.param(backend, id=getattr(pytest, "HIDDEN_PARAM", _FACTORY))]  # there since 8.4
             definition.add_marker(pytest.mark.parametrize(_ANYIO, values, scope="module"))
             metafunc.config.stash.setdefault(_CHOSEN, set()).add(definition.nodeid)
         yield
