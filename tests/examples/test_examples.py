@@ -23,6 +23,8 @@ from compax_aio.simulator.smc import Knobs as SmcKnobs
 from compax_aio.simulator.smc import LogKind as SmcLogKind
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
+APPLICATIONS = {"commissioning", "fastapi_service", "from_pyserial", "scan_loop"}
+"""Whole applications; the others are sketches."""
 NAMES = sorted(path.stem for path in EXAMPLES.glob("*.py"))
 
 
@@ -99,7 +101,7 @@ def test_an_error_is_printed_without_traceback(name: str, capsys: pytest.Capture
 
 @pytest.mark.parametrize("name", NAMES)
 def test_it_is_short(name: str) -> None:
-    assert len((EXAMPLES / f"{name}.py").read_text().splitlines()) <= 80
+    assert len((EXAMPLES / f"{name}.py").read_text().splitlines()) <= (330 if name in APPLICATIONS else 80)
 
 
 # One drive
