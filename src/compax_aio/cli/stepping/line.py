@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator, Iterable
+from collections.abc import AsyncIterator, Iterable, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Final, Literal
 
-from cyclopts import Parameter
+from cyclopts import Parameter, Token
 
 from compax_aio import CompaxError, InvalidCommandError, smc
 from compax_aio.smc.facts import NO_NAME
@@ -17,7 +17,7 @@ from compax_aio.smc.vocabulary import check_name
 from ..moving import MovedSettings
 from ..opening import DriveLine
 
-__all__ = ["THE_ONLY", "AxisName", "AxisOnLine", "LineUrl", "SmcLine"]
+__all__ = ["THE_ONLY", "AxisName", "AxisOnLine", "LineUrl", "SmcLine", "whole"]
 
 THE_ONLY: Final = "-"
 """How the axis is called that has no name, in single mode."""
@@ -32,6 +32,14 @@ AxisName = Annotated[
         allow_leading_hyphen=True, help="Its letter; upper and lower case are different names. In single mode: -"
     ),
 ]
+
+
+def whole(_kind: type, tokens: Sequence[Token]) -> int:
+    """Read a whole number; another one is refused instead of rounded."""
+    try:
+        return int(tokens[0].value)
+    except ValueError:
+        raise ValueError(f"{tokens[0].value!r} is no whole number") from None
 
 
 @Parameter(name="*")

@@ -13,7 +13,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from compax_aio import CompaxError, ConnectionLostError, InvalidCommandError
+from compax_aio import CompaxError, InvalidCommandError
 from compax_aio.smc import AxisStatus, PartyLine
 from compax_aio.smc.facts import POSSIBLE_NAMES
 
@@ -156,13 +156,9 @@ async def _look(party: PartyLine, name: str) -> AxisStanding:
 
 
 async def _look_patiently(party: PartyLine, name: str) -> AxisStanding:
-    """Look at an axis, and say what is wrong if that fails; a line that is given up for good ends the watching."""
+    """Look at an axis, and say what is wrong if that fails: a line that was lost is tried again all the while."""
     try:
         return await _look(party, name)
-    except ConnectionLostError as error:
-        if not party.settings.reconnect:
-            raise
-        return AxisStanding(axis=name or THE_ONLY, error=error.what)
     except CompaxError as error:
         return AxisStanding(axis=name or THE_ONLY, error=error.what)
 

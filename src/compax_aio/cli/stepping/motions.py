@@ -16,7 +16,7 @@ from ...motion.moves import check_manner
 from ..interruption import in_motion
 from ..moving import MoveView, TimeoutS, following, stop_interrupted, written
 from ..printing import Printing
-from .line import AxisName, AxisOnLine, LineUrl, SmcLine
+from .line import AxisName, AxisOnLine, LineUrl, SmcLine, whole
 
 __all__ = ["carry_out", "home", "move", "run"]
 
@@ -62,11 +62,11 @@ async def home(
     url: LineUrl,
     axis: AxisName,
     *,
-    speed: Annotated[int, Parameter(help="Steps per second; begin slowly.")],
+    speed: Annotated[int, Parameter(converter=whole, help="Steps per second; begin slowly.")],
     toward: Annotated[
         Literal["plus", "minus"] | None, Parameter(help="Where the search begins, if the profile knows which that is.")
     ] = None,
-    direction: Annotated[int | None, Parameter(help="Else 0 or 1, as it is sent (F).")] = None,
+    direction: Annotated[int | None, Parameter(converter=whole, help="Else 0 or 1, as it is sent (F).")] = None,
     origin: Annotated[bool, Parameter(negative="--no-origin", help="Count from there on from 0.")] = True,
     timeout_s: TimeoutS = None,
     line: SmcLine = SmcLine(),  # noqa: B008 - it is frozen
@@ -97,7 +97,10 @@ async def run(
     url: LineUrl,
     axis: AxisName,
     speed: Annotated[
-        int, Parameter(allow_leading_hyphen=True, help="Steps per second, at constant speed; below zero toward minus.")
+        int,
+        Parameter(
+            allow_leading_hyphen=True, converter=whole, help="Steps per second, constant; below zero toward minus."
+        ),
     ],
     *,
     for_s: Annotated[
