@@ -23,7 +23,7 @@ from .trace_file import SMALLEST_TRACE, TraceFile
 __all__ = ["DEFAULT_MAX_BYTES", "TraceRecorder", "record_trace"]
 
 DEFAULT_MAX_BYTES: Final = 64 * 1024 * 1024
-"""Of a trace: an hour and more of one drive that is asked something all the time."""
+"""Of a trace: about an hour of one 9600-baud line that is never idle."""
 
 _GATHERED_S: Final = 0.1
 """For so long entries are gathered before they are written: what a crash may cost."""
