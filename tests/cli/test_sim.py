@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import io
 import json
 import os
 import re
@@ -14,11 +15,15 @@ from typing import IO, Any
 
 import pexpect
 import pytest
+from prompt_toolkit.application import create_app_session
+from prompt_toolkit.input import create_pipe_input
+from prompt_toolkit.output import DummyOutput
 
 import compax_aio
 from compax_aio import AnswerTimeoutError, DriveSettings, smc
 from compax_aio.cli import app
 from compax_aio.cli.simulating.hands import Hands
+from compax_aio.cli.simulating.prompt import listen, pasted_above_prompt
 from compax_aio.simulator.clock import VirtualClockLoop
 from compax_aio.simulator.compax import SimulatedDrive
 from compax_aio.simulator.far_end import FarEnd
@@ -370,3 +375,48 @@ async def test_a_person_plays_the_machine_at_a_prompt() -> None:
     await asyncio.to_thread(child.wait)
     assert child.exitstatus == 0
     child.close()
+
+
+# The prompt ---------------------------------------------------------------------------------------------------------
+
+
+async def test_what_is_typed_is_done_until_the_last_word() -> None:
+    drive = SimulatedDrive(name="x")
+    answers: list[str] = []
+    async with played(drive) as (hands, _):
+        with create_pipe_input() as keyboard, create_app_session(input=keyboard, output=DummyOutput()):
+            keyboard.send_text("estop\rwhere\rquit\r")
+            await listen(hands, answers.append, is_conversation=True)
+    assert drive.fault == 55
+    assert answers == ["x: 0.000 mm, standing, not homed, fault 55"]
+
+
+@pytest.mark.parametrize("key", ["\x03", "\x04"])
+async def test_ctrl_c_and_ctrl_d_end_the_conversation(key: str) -> None:
+    async with played(SimulatedDrive(name="x")) as (hands, _):
+        with create_pipe_input() as keyboard, create_app_session(input=keyboard, output=DummyOutput()):
+            keyboard.send_text(key)
+            await listen(hands, print, is_conversation=True)
+        assert hands.wants_end
+
+
+async def test_nobody_can_type_where_there_is_no_input(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stdin", None)
+    async with played(SimulatedDrive(name="x")) as (hands, _):
+        await listen(hands, print, is_conversation=False)
+        assert not hands.wants_end
+
+
+def test_a_conversation_wants_a_terminal_at_both_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    monkeypatch.setattr(sys, "stdin", Terminal())
+    with pasted_above_prompt(wanted=True) as is_conversation:
+        assert not is_conversation
+    monkeypatch.setattr(sys, "stdout", Terminal())
+    with pasted_above_prompt(wanted=False) as is_conversation:
+        assert not is_conversation
+    with create_app_session(output=DummyOutput()), pasted_above_prompt(wanted=True) as is_conversation:
+        assert is_conversation
