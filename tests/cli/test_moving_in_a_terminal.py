@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import re
+import signal
 import sys
 import termios
 from collections.abc import AsyncIterator, Callable
@@ -133,6 +134,35 @@ async def test_a_terminal_that_is_closed_stops_the_axis(
     await until(lambda: not drive.moving)
     assert drive.log.texts(LogKind.MOTION_STOPPED)
     await asyncio.to_thread(terminal.child.wait)
+
+
+async def test_a_terminal_that_is_held_by_ctrl_s_holds_up_no_stop(
+    open_terminal: Callable[..., Terminal], url: str, drive: SimulatedDrive
+) -> None:
+    terminal = open_terminal("move", url, "2000", "--timeout", "4")
+    await until(lambda: drive.moving)
+    terminal.types("\x13")  # from here on it takes nothing
+    await until(lambda: not drive.moving)
+    assert drive.position < 2000 / 3
+    terminal.types("\x11")
+    code, told = await terminal.ends()
+    assert code == 7
+    assert "was not at its target within 4 s and was stopped" in told
+
+
+async def test_a_terminal_that_is_held_by_ctrl_s_does_not_keep_a_signal_from_stopping(
+    open_terminal: Callable[..., Terminal], url: str, drive: SimulatedDrive
+) -> None:
+    terminal = open_terminal("move", url, "2000")
+    await until(lambda: drive.moving)
+    terminal.types("\x13")
+    where = drive.position
+    await until(lambda: drive.position > where + 25)  # what was on its way is stuck by now
+    terminal.child.kill(signal.SIGTERM)
+    await asyncio.to_thread(terminal.child.wait)
+    assert terminal.child.exitstatus == 143
+    assert not drive.moving
+    assert drive.position < 2000 / 3
 
 
 async def test_a_wrong_port_is_told(open_terminal: Callable[..., Terminal]) -> None:

@@ -14,6 +14,7 @@ from types import FrameType
 from typing import Any, Final, TypeVar
 
 from .exit_codes import Interrupted
+from .outlets import until_written
 from .printing import notes_console
 
 __all__ = ["Interruption", "in_motion", "moves_nothing", "say_at_end"]
@@ -28,6 +29,7 @@ _SIGNALS: Final = tuple(
 _PATIENCE: Final = 2
 """So many signals are taken while axes are being stopped; the next one ends the process, whatever moves."""
 
+_LAST_WORDS_S: Final = 0.5
 _MOVES_NOTHING: Final = "moves_nothing"
 
 _current: ContextVar[Interruption | None] = ContextVar("interruption", default=None)
@@ -172,8 +174,10 @@ class Interruption:
     def _give_up(self, number: int) -> None:
         if not self.moves_nothing:
             self._say("Given up: whether what moved was stopped is not known. Look at the machine.")
-        if sys.stdout is not None and sys.stdout.isatty():
-            os.write(sys.stdout.fileno(), b"\x1b[?25h")  # a live display has hidden the cursor
+        with suppress(OSError, RuntimeError):
+            if sys.stdout is not None and sys.stdout.isatty():
+                print(end="\x1b[?25h", flush=True)  # noqa: T201 - a live display has hidden the cursor
+            until_written(sys.stderr, _LAST_WORDS_S)
         signal.signal(number, signal.SIG_DFL)
         os.kill(os.getpid(), number)
 

@@ -17,6 +17,7 @@ from .jogging import KEYS, Jogging
 from .keyboard import expect_keyboard, keys_pressed
 from .moving import following, note_where_from, written
 from .opening import DriveLine, Url
+from .outlets import is_held_up
 from .printing import Printing, notes_console
 
 __all__ = ["jog"]
@@ -89,6 +90,8 @@ class JogView:
 
     def show(self) -> None:
         """Show how it stands now."""
+        if is_held_up(self._live.console.file):
+            return
         where = "…" if self._position is None else written(self._drive, self._position)
         message = self._jogging.message if self._drive.is_open else "the line is lost; the axis may be moving"
         self._live.update(

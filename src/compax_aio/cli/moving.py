@@ -15,6 +15,7 @@ from compax_aio import CompaxError, Drive, Move, MoveResult
 
 from ..motion.moves import MoveFuture
 from .interruption import in_motion, say_at_end
+from .outlets import is_held_up
 from .printing import Printing, notes_console
 
 __all__ = [
@@ -248,7 +249,7 @@ class MoveView:
         if is_news and self._bar is None and not self._move.done():
             self._printing.note(f"{self._drive.name}: {state}")
         self._state = state
-        if self._bar is not None:
+        if self._bar is not None and not is_held_up(self._bar.console.file):
             done = self._share_done()
             self._bar.update(
                 self._task,

@@ -16,6 +16,7 @@ from compax_aio.compax.program_run import check_record_number
 from .interruption import in_motion
 from .moving import TimeoutS, following, stop_interrupted, written
 from .opening import DriveLine, Url
+from .outlets import is_held_up
 from .printing import Printing, notes_console
 
 __all__ = ["run"]
@@ -128,7 +129,7 @@ class RunView:
 
     def show(self) -> None:
         """Show how the program and its line stand now."""
-        if self._bar is None:
+        if self._bar is None or is_held_up(self._bar.console.file):
             return
         is_there = self._drive.is_open
         self._bar.update(

@@ -8,7 +8,7 @@ import logging
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from typing import Any, Final
 
 from cyclopts import App, CycloptsError
@@ -16,6 +16,7 @@ from cyclopts import App, CycloptsError
 from ..errors import CompaxError
 from .exit_codes import INTERRUPTED, OK, USAGE, Interrupted, UsageError, exit_code_of
 from .interruption import Interruption
+from .outlets import outlets_open, until_written
 from .printing import Printing, notes_console, tell_error, tell_warning
 
 __all__ = ["run_words"]
@@ -49,8 +50,15 @@ def run_words(app: App, words: Sequence[str], prepare: Callable[[Sequence[str]],
     except (KeyboardInterrupt, Exception) as error:
         return _told_of(error, as_document=as_document)
     as_document = any(isinstance(each, Printing) and each.json for each in bound.arguments.values())
-    with _warnings_told(as_document=as_document), Interruption(command) as interruption:
-        return _told(command, bound, interruption, as_document=as_document)
+    with ExitStack() as stack:
+        stack.enter_context(_warnings_told(as_document=as_document))
+        interruption = stack.enter_context(Interruption(command))
+        if not interruption.moves_nothing:  # what moves is watched and stopped although nobody takes the output
+            stack.enter_context(outlets_open(lambda: interruption.signal is not None))
+        try:
+            return _told(command, bound, interruption, as_document=as_document)
+        except KeyboardInterrupt as impatience:  # all is over, but for last words that nobody takes
+            return exit_code_of(impatience)
 
 
 def _told(
@@ -150,6 +158,7 @@ def _tell(error: BaseException, *, as_document: bool) -> None:
 def _flush() -> None:
     """Write what waits, while there is still somebody to tell that it cannot be written."""
     try:
+        until_written(sys.stdout)
         sys.stdout.flush()
     except OSError:
         _write_to_nobody()  # or Python would complain at its end once more

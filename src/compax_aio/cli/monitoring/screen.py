@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import sys
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -14,6 +15,7 @@ from textual.containers import VerticalScroll
 from textual.screen import ModalScreen
 from textual.widgets import RichLog
 
+from ..outlets import is_held_up
 from .axis import MonitoredAxis
 from .cell import Cell
 from .dialogs import Help, Leaving, Question
@@ -138,7 +140,7 @@ class Monitor(App[bool]):
 
     def show(self) -> None:
         """Show everything as it is known now."""
-        if not self.is_running or not self.screen_stack:
+        if not self.is_running or not self.screen_stack or is_held_up(sys.__stderr__):
             return
         now = asyncio.get_running_loop().time()
         for number, (axis, panel) in enumerate(zip(self.cell.axes, self._panels, strict=True)):
