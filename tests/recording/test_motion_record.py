@@ -7,6 +7,7 @@ import errno
 import logging
 import signal
 import sys
+import threading
 import time
 from collections.abc import AsyncIterator
 from datetime import datetime, timedelta
@@ -19,6 +20,7 @@ from tests.promises.bench import bench, ending, lines, now, scripted, until, wat
 from tests.promises.cable import connected, outage
 
 from compax_aio import Drive, DriveGroup, DriveSettings, InvalidCommandError, MoveStoppedError
+from compax_aio.motion.events import EventHub, EventStream
 from compax_aio.recording import MotionRecord, MotionRecording, motion_file, read_record, record
 from compax_aio.recording.motion_asking import QUANTITIES
 from compax_aio.simulator.compax import LogKind
@@ -554,6 +556,75 @@ async def test_a_device_that_cannot_be_asked_for_it_says_what_it_can(path: Path)
     with pytest.raises(InvalidCommandError, match=r"'torque' cannot be recorded of it; possible are position$"):
         async with record(Stepper(), path, quantities=["position", "torque"]):
             raise AssertionError
+
+
+class _Saying:
+    """A device that says one value for ever."""
+
+    name, unit = "x", "mm"
+
+    def __init__(self, value: object) -> None:
+        self._value = value
+        self.hub = EventHub()
+
+    def events(self) -> EventStream:
+        return self.hub.stream()
+
+    async def position(self) -> Any:
+        await asyncio.sleep(0.01)
+        return self._value
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), 10**400, "5", None])
+async def test_what_no_record_can_hold_is_missing_and_the_record_is_read_back(path: Path, value: object) -> None:
+    async with record(_Saying(value), path, quantities=["position"]) as recording:
+        await asyncio.sleep(0.1)
+    assert (recording.samples, recording.missing) == (0, 1)
+    (why,) = read_record(path).axes["x"].traces["position"].missing.values()
+    assert "no number" in why
+
+
+async def test_a_mark_after_the_end_is_refused_and_harms_nothing(path: Path) -> None:
+    async with record(_Saying(1.0), path, quantities=["position"]) as recording:
+        await asyncio.sleep(0.1)
+    with pytest.raises(InvalidCommandError, match="has ended, and takes no mark 'late'"):
+        recording.mark("late")
+    assert read_record(path).marks == ()
+
+
+async def test_a_mark_while_the_end_is_written_is_refused_and_the_record_can_be_read(path: Path) -> None:
+    async with record(_Saying(1.0), path, quantities=["position"]) as recording:
+        await asyncio.sleep(0.1)
+        close = recording._file.close
+
+        def slowly(ended: motion_file.Row) -> bool:
+            with pytest.raises(InvalidCommandError, match="has ended"):
+                recording.mark("in between")
+            return close(ended)
+
+        recording._file.close = slowly  # type: ignore[method-assign]
+    assert read_record(path).ended == "as asked"
+
+
+async def test_a_mark_of_any_length_is_read_back(path: Path) -> None:
+    async with record(_Saying(1.0), path, quantities=["position"]) as recording:
+        recording.mark("word " * 10_000)
+    (mark,) = read_record(path).marks
+    assert mark.word.startswith("word word")
+    assert mark.word.endswith("…")
+
+
+async def test_an_axis_whose_name_no_line_holds_is_refused(path: Path) -> None:
+    with pytest.raises(InvalidCommandError, match="at most 200 letters"):
+        async with record({"x" * 201: _Saying(1.0)}, path):
+            raise AssertionError
+
+
+async def test_a_record_that_cannot_begin_leaves_no_thread(path: Path) -> None:
+    with pytest.raises(InvalidCommandError, match="torque"):
+        async with record(_Saying(1.0), path, quantities=["torque"]):
+            raise AssertionError
+    assert not [thread for thread in threading.enumerate() if thread.name == f"record {path.name}"]
 
 
 async def test_a_defect_ends_the_record_and_is_raised(path: Path) -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 import csv
 import os
 import sys
 from datetime import UTC, datetime
 from math import isnan
 from pathlib import Path
+from typing import Any
 
 import pyarrow.parquet  # type: ignore[import-untyped]
 import pytest
@@ -15,8 +17,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.promises.bench import bench
 
-from compax_aio import InvalidCommandError
-from compax_aio.recording import read_record, record
+from compax_aio import Drive, InvalidCommandError
+from compax_aio.recording import motion_file, read_record, record
 from compax_aio.recording.motion_file import COLUMNS, Kind, RecordFile, Row
 
 STARTED = datetime(2026, 3, 1, 12, 30, tzinfo=UTC)
@@ -141,6 +143,7 @@ def _fields() -> list[tuple[str, ...]]:
         (row(2, "0,,record,format,2,"), "line 2: it is of format 2.0, and this version reads format 1"),
         (row(3, "0,,record,started,,yesterday"), r"line 3, column 6 \(text\): 'yesterday' is no date"),
         (row(3, "0,,record,started,,2026-03-01T12:30"), "no date and time with a zone"),
+        (row(7, "0.24,x,sample,position,1,"), r"line 7, column 1 \(time_s\): 0.24 s is before 0.25 s"),
         (row(7, "1.0,,record,ended,1,") + "2.0,x,sample,position,1,\n", "line 8: the record had ended before"),
     ],
 )
@@ -174,7 +177,7 @@ def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
 
 @given(
     axis=st.text(max_size=20),
-    name=st.text(max_size=20),
+    name=st.text(max_size=20) | st.sampled_from(["long " * 5000, '\U0001f600\0"' * 9000]),
     value=st.none() | st.floats(allow_nan=False, allow_infinity=False),
     text=st.text(max_size=700),
     time_s=st.floats(min_value=0, max_value=1e7),
@@ -190,6 +193,37 @@ def test_whatever_is_said_is_one_line_that_is_read_back(
     assert mark.value == value
     assert mark.text.isprintable()
     assert len(mark.text) < 6000
+
+
+def test_where_rows_were_lost_the_samples_are_not_joined(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(motion_file, "_MAX_WAITING", 6)
+    file = RecordFile(path, overwrite=True)
+    file.open(STARTED)
+    for each in (*ROWS[:2], *(Row(at / 10, "x", Kind.SAMPLE, "position", at) for at in range(10))):
+        file.put(each)  # the disk takes nothing meanwhile
+    file.write_waiting()
+    file.put(Row(1.0, "x", Kind.SAMPLE, "position", 10.0))
+    file.close(Row(1.1, "", Kind.RECORD, "ended", 5, "as asked"))
+    read = read_record(path)
+    assert read.rows_lost == 6
+    trace = read.axes["x"].traces["position"]
+    assert list(trace.samples()) == [(0.0, 0.0), (0.1, 1.0), (0.2, 2.0), (0.3, 3.0), (1.0, 10.0)]
+    (gap,) = (number for number, value in enumerate(trace.values) if isnan(value))
+    assert gap == 4
+    assert "lost" in trace.missing[trace.times_s[gap]]
+
+
+def test_rows_that_come_after_lost_ones_stand_behind_the_gap(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(motion_file, "_MAX_WAITING", 4)
+    file = RecordFile(path, overwrite=True)
+    file.open(STARTED)
+    for each in (*ROWS[:2], *(Row(at / 10, "x", Kind.SAMPLE, "position", at) for at in range(4))):
+        file.put(each)
+    file._waiting.popleft()  # the disk has just begun to take them
+    file.put(Row(0.9, "x", Kind.SAMPLE, "position", 9.0))
+    kinds = [(row.kind, row.name, row.time_s) for row in file._waiting][-2:]
+    file.close(Row(1.0, "", Kind.RECORD, "ended", 4, "as asked"))
+    assert kinds == [(Kind.RECORD, "lost", 0.9), (Kind.SAMPLE, "position", 0.9)]
 
 
 async def test_any_reader_of_tables_takes_it(path: Path) -> None:
@@ -281,6 +315,28 @@ async def test_a_parquet_file_that_cannot_be_made_leaves_the_csv_file(
             async with record(drive, path):
                 pass
     assert sorted(names_in(tmp_path)) == ["run.parquet.csv"]
+    assert read_record(tmp_path / "run.parquet.csv").cut is None
+
+
+async def test_a_parquet_file_that_a_stuck_disk_does_not_take_is_given_up_and_the_csv_file_is_named(
+    tmp_path: Path,
+) -> None:
+    stuck = asyncio.Event()
+    path = tmp_path / "run.parquet"
+
+    async def work(drive: Drive) -> None:
+        async with record(drive, path) as recording:
+            real = recording._in_thread
+
+            def in_thread(job: Any, *arguments: Any) -> Any:
+                is_making = job.__name__ == "_make_parquet"
+                return asyncio.ensure_future(stuck.wait()) if is_making else real(job, *arguments)
+
+            recording._in_thread = in_thread  # type: ignore[method-assign, assignment]
+
+    async with bench() as (drive, _):
+        with pytest.raises(OSError, match=r"not made within 10 s; all of it is in .*run\.parquet\.csv"):
+            await work(drive)
     assert read_record(tmp_path / "run.parquet.csv").cut is None
 
 

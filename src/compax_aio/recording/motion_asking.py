@@ -7,14 +7,15 @@ from collections import deque
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from math import floor, isfinite
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import Any, Final, Protocol, TypeGuard
 
 from ..checked_numbers import check_number
 from ..errors import InvalidCommandError
 from ..escaping import shown
 from ..motion.events import EventStream
-from .motion_file import is_parquet
+from .motion_file import MAX_NAME, is_parquet
 
 __all__ = [
     "QUANTITIES",
@@ -26,6 +27,8 @@ __all__ = [
     "axis_of",
     "check_record",
     "drives_by_axis",
+    "is_number",
+    "next_beat",
 ]
 
 QUANTITIES: Final = ("position", "target", "following_error", "speed", "torque")
@@ -36,6 +39,7 @@ _UNITS: Final = {"speed": "%", "torque": "%"}
 _STATUS_VALUE: Final = re.compile(r"S([1-9][0-9]{0,2})")
 _HIGHEST_STATUS: Final = 250
 
+_SAME_TIME_S: Final = 1e-6
 _TIMES_KEPT: Final = 1000
 """Of answers, to know their rate."""
 
@@ -192,6 +196,21 @@ def drives_by_axis(devices: Recordables) -> dict[str, Recordable]:
     if not found:
         raise InvalidCommandError("no drive was named, so nothing is recorded")
     for name, drive in found.items():
+        if len(name) > MAX_NAME:
+            raise InvalidCommandError(f"the name of an axis has at most {MAX_NAME} letters, not as {shown(name)}")
         if not hasattr(drive, "events"):
             raise InvalidCommandError(f"{name} is {shown(drive)}, and no drive whose motion can be recorded")
     return found
+
+
+def is_number(value: object) -> TypeGuard[float]:
+    """Whether *value* is a finite number that a file can hold."""
+    try:
+        return isinstance(value, int | float) and isfinite(value)
+    except OverflowError:  # of an int that no float can hold
+        return False
+
+
+def next_beat(at: float, interval_s: float) -> float:
+    """Return the next whole multiple of *interval_s*, so that all axes are read together; without one, *at*."""
+    return at if interval_s <= 0 else (floor((at + _SAME_TIME_S) / interval_s) + 1) * interval_s

@@ -24,7 +24,7 @@ from ..errors import InvalidCommandError
 from ..escaping import escaped, shown
 from ..text_file import name_of
 
-__all__ = ["COLUMNS", "FORMAT", "Kind", "RecordFile", "Row", "csv_path_of", "is_parquet"]
+__all__ = ["COLUMNS", "FORMAT", "MAX_NAME", "Kind", "RecordFile", "Row", "csv_path_of", "expect_free", "is_parquet"]
 
 COLUMNS: Final = ("time_s", "axis", "kind", "name", "value", "text")
 FORMAT: Final = 1
@@ -32,6 +32,8 @@ FORMAT: Final = 1
 _MAX_WAITING: Final = 50_000
 """Rows that a disk which does not take them may leave waiting; what comes then is lost, and counted."""
 _MAX_TEXT: Final = 500
+MAX_NAME: Final = 200
+"""Letters of the name of an axis; of a longer word of a mark the rest is left out."""
 _PARQUET: Final = ".parquet"
 
 
@@ -68,8 +70,8 @@ class Row:
     def as_fields(self) -> tuple[str, ...]:
         """Write it as the fields of a line."""
         value = "" if self.value is None else repr(float(self.value))
-        text = escaped(self.text if len(self.text) <= _MAX_TEXT else f"{self.text[: _MAX_TEXT - 1]}…")
-        return (f"{self.time_s:.6f}", escaped(self.axis), self.kind.value, escaped(self.name), value, text)
+        name, text = escaped(_cut(self.name, MAX_NAME)), escaped(_cut(self.text, _MAX_TEXT))
+        return (f"{self.time_s:.6f}", escaped(self.axis), self.kind.value, name, value, text)
 
     @staticmethod
     def of_fields(fields: list[str], where: str) -> Row:
@@ -91,6 +93,10 @@ class Row:
 
 
 _KINDS: Final = {kind.value: kind for kind in Kind}
+
+
+def _cut(text: str, letters: int) -> str:
+    return text if len(text) <= letters else f"{text[: letters - 1]}…"
 
 
 def _number(where: str, column: str, text: str) -> float:
@@ -125,6 +131,17 @@ def csv_path_of(path: Path) -> Path:
     return path.with_name(f"{path.name}.csv") if is_parquet(path) else path
 
 
+def expect_free(path: Path) -> None:
+    """
+    Do nothing if there is no *path* yet.
+
+    Raises:
+        FileExistsError: There is.
+    """
+    if path.exists() or path.is_symlink():
+        raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path))
+
+
 class RecordFile:
     """
     Takes rows at any time, and writes them in a thread, which is always the same one.
@@ -137,6 +154,8 @@ class RecordFile:
     def __init__(self, path: Path, *, overwrite: bool) -> None:
         self.lost = 0
         """Rows that could not wait any longer."""
+        self.rows = 0
+        """Rows that were written, or are to be."""
         self._path = path
         self._overwrite = overwrite
         self._waiting: deque[Row] = deque()
@@ -147,8 +166,15 @@ class RecordFile:
         """Let *row* be written; takes no time."""
         if len(self._waiting) >= _MAX_WAITING:
             self.lost += 1
-        else:
-            self._waiting.append(row)
+            return
+        if self.lost > self._lost_told:  # here they are missing, and nowhere else
+            self._waiting.append(self._told_lost(row.time_s))
+        self._waiting.append(row)
+        self.rows += 1
+
+    def _told_lost(self, time_s: float) -> Row:
+        self._lost_told = self.lost
+        return Row(time_s, "", Kind.RECORD, "lost", self.lost, "rows until here, for the disk was too slow")
 
     def open(self, started: datetime) -> None:
         """
@@ -182,9 +208,7 @@ class RecordFile:
             last_s = max(last_s, row.time_s)
             writer.writerow(row.as_fields())
         if self.lost > self._lost_told:
-            self._lost_told = self.lost
-            told = Row(last_s, "", Kind.RECORD, "lost", self.lost, "rows, for the disk was too slow")
-            writer.writerow(told.as_fields())
+            writer.writerow(self._told_lost(last_s).as_fields())
         try:
             self._file.write(lines.getvalue())
             self._file.flush()

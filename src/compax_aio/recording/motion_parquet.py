@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import os
 import secrets
 from collections.abc import Iterator
 from contextlib import suppress
@@ -51,6 +52,8 @@ def convert(source: Path, target: Path) -> None:
             where = name_of(source)
             while group := [Row.of_fields(fields, where) for fields in islice(lines, _ROWS_A_GROUP)]:
                 writer.write_table(_table(group, schema))
+        with new.open("rb+") as file:
+            os.fsync(file.fileno())  # before anybody removes what it was made of
         new.replace(target)
     except BaseException:
         with suppress(OSError):

@@ -183,6 +183,13 @@ class _Gathered:
     values: dict[str, array[float]] = field(default_factory=dict)
     missing: dict[str, dict[float, str]] = field(default_factory=dict)
 
+    def interrupt(self, time_s: float, why: str) -> None:
+        """Let nothing that was read before be joined to what comes."""
+        for name in self.units:
+            self.missing[name][time_s] = why
+            self.times_s[name].append(time_s)
+            self.values[name].append(nan)
+
     def traces(self) -> Mapping[str, Trace]:
         return MappingProxyType(
             {
@@ -224,6 +231,9 @@ class _Gathering:
             )
         if row.name == "started":
             _wall_clock(row, where)
+        if row.name == "lost":
+            for axis in self._axes.values():
+                axis.interrupt(row.time_s, "rows were lost, for the disk was too slow")
         self._facts[row.name] = row
 
     def _take_quantity(self, row: Row, where: str) -> None:
@@ -243,9 +253,14 @@ class _Gathering:
         if (row.value is None) is (row.kind is Kind.SAMPLE):
             needs = "has a value" if row.kind is Kind.SAMPLE else "has no value"
             raise InvalidCommandError(f"{where}, column 5 (value): a {row.kind.value} {needs}")
+        times_s = axis.times_s[row.name]
+        if times_s and row.time_s < times_s[-1]:
+            raise InvalidCommandError(
+                f"{where}, column 1 (time_s): {row.time_s:g} s is before {times_s[-1]:g} s, which stands before it"
+            )
         if row.value is None:
             axis.missing[row.name][row.time_s] = row.text
-        axis.times_s[row.name].append(row.time_s)
+        times_s.append(row.time_s)
         axis.values[row.name].append(nan if row.value is None else row.value)
 
     def record(self, path: Path, dropped: str) -> MotionRecord:

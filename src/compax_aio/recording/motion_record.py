@@ -10,12 +10,10 @@ from __future__ import annotations
 import asyncio
 import errno
 import logging
-import os
 from collections.abc import AsyncIterator, Callable, Coroutine, Mapping, Sequence
 from contextlib import asynccontextmanager
 from datetime import datetime
 from functools import partial
-from math import floor
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
@@ -34,8 +32,10 @@ from .motion_asking import (
     axis_of,
     check_record,
     drives_by_axis,
+    is_number,
+    next_beat,
 )
-from .motion_file import Kind, RecordFile, Row, csv_path_of, is_parquet
+from .motion_file import Kind, RecordFile, Row, csv_path_of, expect_free, is_parquet
 from .own_thread import OwnThread
 
 __all__ = ["MotionRecording", "record"]
@@ -45,12 +45,13 @@ _log = logging.getLogger("compax_aio.recording")
 _FLUSH_S: Final = 0.5
 _SHORTEST_S: Final = 0.001
 """Of one reading: a line without any limit of its own must not take the whole processor."""
-_SAME_TIME_S: Final = 1e-6
 _REFUSED_AGAIN_S: Final = 5.0
 """What the drive refuses is asked again so rarely: most of it will be refused for ever."""
 _LOST_AGAIN_S: Final = 0.5
 _RATE_OVER_S: Final = 5.0
 _CLOSE_TIMEOUT_S: Final = 10.0
+_ROWS_CONVERTED_A_SECOND: Final = 10_000
+"""At the very least; of a longer record the making of a Parquet file may take longer."""
 
 _Result = TypeVar("_Result")
 
@@ -87,8 +88,8 @@ class MotionRecording:
         self._loop = asyncio.get_running_loop()
         self._zero_at = self._loop.time()
         self._pause_share = 1 / line_share - 1
+        self._overwrite = overwrite
         self._file = RecordFile(csv_path_of(path), overwrite=overwrite)
-        self._thread = OwnThread(f"record {path.name}")
         self._over = asyncio.Event()
         self._tasks: list[asyncio.Task[None]] = []
         self._axes = {
@@ -102,6 +103,7 @@ class MotionRecording:
             )
             for name, device in devices.items()
         }
+        self._thread = OwnThread(f"record {path.name}")  # last: whoever has it ends it
 
     # For who records ------------------------------------------------------------------------------------------------
 
@@ -151,15 +153,16 @@ class MotionRecording:
             text: More about it.
 
         Raises:
-            InvalidCommandError: There is no such axis, or *value* is no finite number.
+            InvalidCommandError: There is no such axis, *value* is no finite number, or the record has ended.
         """
+        if self._ended_after_s is not None:
+            raise InvalidCommandError(f"the record {name_of(self.path)} has ended, and takes no mark {shown(word)}")
         if axis and axis not in self._axes:
             raise InvalidCommandError(f"{axis!r} is not recorded here; recorded: {', '.join(self._axes)}")
         if value is not None:
             value = check_number("value", value)
         for each in self._axes.values():
             self._take_waiting_events(each)  # what happened before stands before it
-
         self._put(self._loop.time(), axis, Kind.MARK, word, value=value, text=text)
 
     async def until_over(self) -> None:
@@ -172,6 +175,8 @@ class MotionRecording:
         self._file.put(Row(max(at - self._zero_at, 0.0), axis, kind, name, value, text))
 
     async def _begin(self) -> None:
+        if not self._overwrite:
+            await self._in_thread(expect_free, self.path)  # which may not be the one that is written
         for axis in self._axes.values():
             self._put(self._zero_at, axis.name, Kind.AXIS, "unit", text=axis.drive.unit)
             for quantity in axis.quantities:
@@ -217,8 +222,8 @@ class MotionRecording:
             return _LOST_AGAIN_S if isinstance(error, ConnectionLostError) else 0.0
         value = getattr(said, "value", said)
         if quantity is axis.status:
-            quantity.due_at = _next_beat(self._loop.time(), quantity.interval_s)
-        elif isinstance(value, int | float):
+            quantity.due_at = next_beat(self._loop.time(), quantity.interval_s)
+        elif is_number(value):
             self._note_unit(axis, quantity, getattr(said, "unit", quantity.unit) or "")
             self._note_sample(axis, quantity, float(value))
         else:
@@ -239,13 +244,13 @@ class MotionRecording:
         axis.samples += 1
         axis.newest[quantity.name] = value
         axis.answered_at.append(at)
-        quantity.due_at = _next_beat(at, quantity.interval_s)
+        quantity.due_at = next_beat(at, quantity.interval_s)
 
     def _note_missing(self, axis: RecordedAxis, quantity: RecordedQuantity, why: str, *, is_refused: bool) -> None:
         if axis.is_over:
             return
         at = self._loop.time()
-        quantity.due_at = _next_beat(at, quantity.interval_s)
+        quantity.due_at = next_beat(at, quantity.interval_s)
         if is_refused:
             quantity.due_at = max(quantity.due_at, at + _REFUSED_AGAIN_S)
             if not quantity.is_refused:
@@ -292,28 +297,28 @@ class MotionRecording:
         self._ended_after_s = self.time_s
         ended = Row(self._ended_after_s, "", Kind.RECORD, "ended", self.samples, why)
         try:
-            async with asyncio.timeout(_CLOSE_TIMEOUT_S):
-                is_whole = await self._in_thread(self._file.close, ended)
+            late = f"The disk has not taken the end of it within {_CLOSE_TIMEOUT_S:g} s"
+            is_whole = await self._in_time(_CLOSE_TIMEOUT_S, late, self._file.close, ended)
             if is_whole and is_parquet(self.path):
-                await self._in_thread(_make_parquet, self.path)
+                timeout_s = _CLOSE_TIMEOUT_S + self._file.rows / _ROWS_CONVERTED_A_SECOND
+                late = f"It was not made within {timeout_s:.0f} s; all of it is in {name_of(csv_path_of(self.path))}"
+                await self._in_time(timeout_s, late, _make_parquet, self.path)
         except Exception as error:  # whatever was the reason for ending is the one to be raised
-            self._fail(_told_late(self.path) if isinstance(error, TimeoutError) else error)
+            self._fail(error)
         finally:
             self._thread.shutdown(wait=False)
+
+    async def _in_time(self, timeout_s: float, late: str, work: Callable[..., _Result], *arguments: Any) -> _Result:
+        try:
+            async with asyncio.timeout(timeout_s):
+                return await self._in_thread(work, *arguments)
+        except TimeoutError:
+            raise OSError(errno.ETIMEDOUT, late, str(self.path)) from None
 
     def _take_waiting_events(self, axis: RecordedAxis) -> None:
         """Note what was told until now, and not yet taken."""
         for event in axis.events.take_waiting():
             self._note_event(axis, event)
-
-
-def _next_beat(at: float, interval_s: float) -> float:
-    """Return the next whole multiple of *interval_s*, so that all axes are read together; without one, *at*."""
-    return at if interval_s <= 0 else (floor((at + _SAME_TIME_S) / interval_s) + 1) * interval_s
-
-
-def _told_late(path: Path) -> OSError:
-    return OSError(errno.ETIMEDOUT, f"The disk has not taken the end of it within {_CLOSE_TIMEOUT_S:g} s", str(path))
 
 
 def _make_parquet(path: Path) -> None:
@@ -339,9 +344,9 @@ async def record(
     Record what drives say of their motion, and what happens to them, while the block runs.
 
     ``async with record(drive, "run.csv"): await drive.move_to(100)``. Each drive is asked one quantity after the
-    other, and each answer is written with the time at which it arrived.
-    What is not said is empty. The file is complete up to the last half second if the process dies. Moves, stops and
-    all that the library asks itself go first on the line; reads of others and those of the record take turns.
+    other, and each answer is written with the time at which it arrived; what is not said is empty. The file is complete
+    up to the last half second if the process dies. Moves, stops and all that the library asks itself go first on the
+    line; reads of others and those of the record take turns.
 
     Args:
         devices: A drive, a group, drives by the names of their axes, or several drives. They must stay open.
@@ -370,8 +375,6 @@ async def record(
         line_share=line_share,
     )
     await asyncio.to_thread(check)  # which imports a library
-    if is_parquet(path) and path.exists() and not overwrite:
-        raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path))
     recording = MotionRecording(
         drives_by_axis(devices),
         path,
