@@ -202,7 +202,7 @@ def test_an_axis_that_is_not_in_the_chain_is_told(compax: Compax) -> None:
     ("words", "says"),
     [
         (["move", "X", "1e9"], "8,388,607.99"),
-        (["move", "X", "nan"], "position_steps"),
+        (["move", "X", "nan"], "no number"),
         (["move", "XY", "10"], "name"),
         (["move", "X", "10", "--timeout", "-1"], "timeout_s"),
         (["move", "X", "10", "--echo-timeout", "0"], "echo_timeout_s"),

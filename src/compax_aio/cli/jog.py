@@ -16,6 +16,7 @@ from .interruption import in_motion, say_at_end
 from .jogging import KEYS, Jogging
 from .keyboard import expect_keyboard, keys_pressed
 from .moving import following, note_where_from, written
+from .number_words import NUMBER
 from .opening import DriveLine, Url
 from .outlets import is_held_up
 from .printing import Printing, notes_console
@@ -26,8 +27,8 @@ __all__ = ["jog"]
 async def jog(
     url: Url,
     *,
-    step: Annotated[float, Parameter(help="How far one step is at first, in the unit of the axis.")] = 1.0,
-    speed: Annotated[float, Parameter(help="In percent of nominal speed.")] = 10.0,
+    step: Annotated[float, NUMBER, Parameter(help="How far one step is at first, in the unit of the axis.")] = 1.0,
+    speed: Annotated[float, NUMBER, Parameter(help="In percent of nominal speed.")] = 10.0,
     line: DriveLine = DriveLine(),  # noqa: B008 - it is frozen
 ) -> int:
     """

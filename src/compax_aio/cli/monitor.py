@@ -13,6 +13,7 @@ from cyclopts import Parameter
 from ..checked_numbers import check_number
 from ..errors import InvalidCommandError
 from .exit_codes import INTERRUPTED, OK, exit_code_of
+from .number_words import NUMBER
 from .opening import DriveLine
 from .printing import notes_console
 
@@ -25,10 +26,10 @@ __all__ = ["monitor"]
 async def monitor(
     *lines: Annotated[str, Parameter(name="URL")],
     settings: Annotated[tuple[str, ...], Parameter(env_var="COMPAX_SETTINGS", negative=(), show_default=False)] = (),
-    interval: float = 0.2,
+    interval: Annotated[float, NUMBER] = 0.2,
     allow_motion: Annotated[bool, Parameter(negative=(), show_default=False)] = False,
-    step: float = 1.0,
-    jog_speed: float = 10.0,
+    step: Annotated[float, NUMBER] = 1.0,
+    jog_speed: Annotated[float, NUMBER] = 10.0,
     trace: Path | None = None,
 ) -> int:
     """

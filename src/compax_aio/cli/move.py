@@ -12,7 +12,9 @@ from compax_aio import CompaxError, ConnectionLostError, Drive, Move
 from compax_aio.compax.moves import check_manner
 from compax_aio.compax.vocabulary import MovePlan, plan_move_by, plan_move_to
 
+from .interruption import say_at_end
 from .moving import TimeoutS, carry_out, note_where_from, stop_interrupted
+from .number_words import NUMBER, WHOLE
 from .opening import DriveLine, Url
 from .printing import Printing
 
@@ -23,6 +25,7 @@ async def move(
     url: Url,
     position: Annotated[
         float,
+        NUMBER,
         Parameter(
             allow_leading_hyphen=True,
             help="Target in the unit of the axis; with --by the distance from where it is now. It may be negative.",
@@ -32,12 +35,13 @@ async def move(
     by: Annotated[bool, Parameter(negative=(), help="Move by a distance.")] = False,
     speed: Annotated[
         float | None,
+        NUMBER,
         Parameter(help="In percent of nominal speed, above 0; if not given, the one that the drive was told last."),
     ] = None,
     acceleration_ms: Annotated[
-        int | None, Parameter(help="From standstill to nominal speed, 0 to 65000; if not given, the last one.")
+        int | None, WHOLE, Parameter(help="From standstill to nominal speed, 0 to 65000; if not given, the last one.")
     ] = None,
-    deceleration_ms: Annotated[int | None, Parameter(help="The same for braking.")] = None,
+    deceleration_ms: Annotated[int | None, WHOLE, Parameter(help="The same for braking.")] = None,
     timeout_s: TimeoutS = None,
     detach: Annotated[
         bool,
@@ -88,10 +92,9 @@ async def _leave_alone(drive: Drive, plan: MovePlan, printing: Printing) -> None
         going.cancel()
         await stop_interrupted(drive, printing, was_sent=going.is_on_wire)
         raise
-    printing.show(
-        {"drive": drive.name, "sent": going.sent, "target": going.target, "detached": True},
-        f"{drive.name} has accepted {going.sent}; it goes on, and nobody watches it. `compax stop` stops it.",
-    )
+    told = f"{drive.name} has accepted {going.sent}; it goes on, and nobody watches it. `compax stop` stops it."
+    say_at_end(f"Interrupted. {told}")
+    printing.show({"drive": drive.name, "sent": going.sent, "target": going.target, "detached": True}, told)
     with suppress(CompaxError):
         await _let_go(drive, going)
 

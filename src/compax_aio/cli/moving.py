@@ -15,6 +15,7 @@ from compax_aio import CompaxError, Drive, Move, MoveResult
 
 from ..motion.moves import MoveFuture
 from .interruption import in_motion, say_at_end
+from .number_words import NUMBER
 from .outlets import is_held_up
 from .printing import Printing, notes_console
 
@@ -32,6 +33,7 @@ __all__ = [
 
 TimeoutS = Annotated[
     float | None,
+    NUMBER,
     Parameter(
         name="--timeout",
         help="Seconds that all of it may take; then the axis is stopped. If not given: as long as the axis moves.",
@@ -76,14 +78,15 @@ async def carry_out(drive: Drive, move: Move, printing: Printing) -> None:
         move.cancel()  # where it was not awaited yet
         await stop_interrupted(drive, printing, was_sent=move.is_on_wire)
         raise
+    target = "machine zero" if result.target is None else written(drive, result.target)
+    say_at_end(f"Interrupted. {drive.name} had reached {target} before.")
     position = None
     with suppress(CompaxError):
         position = await drive.position()
-    _show_result(drive, result, position, printing)
+    _show_result(drive, result, target, position, printing)
 
 
-def _show_result(drive: Drive, result: MoveResult, position: float | None, printing: Printing) -> None:
-    target = "machine zero" if result.target is None else written(drive, result.target)
+def _show_result(drive: Drive, result: MoveResult, target: str, position: float | None, printing: Printing) -> None:
     standing = "; its position could not be read" if position is None else f"; it stands at {written(drive, position)}"
     printing.show(
         {

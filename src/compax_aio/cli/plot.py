@@ -12,6 +12,7 @@ from compax_aio.recording.motion_reading import MotionRecord, read_record
 
 from .files import Force, expect_free
 from .interruption import moves_nothing
+from .number_words import NUMBER
 from .printing import Printing
 
 __all__ = ["plot"]
@@ -30,9 +31,9 @@ def plot(
         tuple[str, ...], Parameter(negative=(), help="Draw only this axis; may be given several times.")
     ] = (),
     from_: Annotated[
-        float | None, Parameter(name="--from", help="Seconds from the start where the picture begins.")
+        float | None, NUMBER, Parameter(name="--from", help="Seconds from the start where the picture begins.")
     ] = None,
-    until: Annotated[float | None, Parameter(help="Seconds from the start where it ends.")] = None,
+    until: Annotated[float | None, NUMBER, Parameter(help="Seconds from the start where it ends.")] = None,
     title: Annotated[str | None, Parameter(help="In place of the names of the axes.")] = None,
     overlay: Annotated[
         bool,

@@ -22,6 +22,7 @@ from ..compax.probing import probe as probe_drive
 from ..errors import UnexpectedAnswerError
 from .files import Force, expect_free
 from .interruption import moves_nothing
+from .number_words import NUMBER, WHOLE
 from .opening import DriveLine, Url
 from .printing import Printing, notes_console
 
@@ -41,6 +42,7 @@ async def probe(
     force: Force = False,
     baud_rate: Annotated[
         tuple[int, ...],
+        WHOLE,
         Parameter(
             negative=(),
             validator=Number(gt=0, lte=12_000_000),
@@ -50,6 +52,7 @@ async def probe(
     ] = BAUD_RATES,
     timeout_s: Annotated[
         float,
+        NUMBER,
         Parameter(name="--timeout", validator=Number(gt=0, lte=3600), help="Seconds that all of it may take."),
     ] = 60.0,
     line: DriveLine = DriveLine(),  # noqa: B008 - it is frozen

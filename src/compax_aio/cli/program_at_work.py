@@ -13,8 +13,9 @@ from compax_aio import Drive, InvalidCommandError, MoveTimeoutError
 from compax_aio.compax.moves import check_manner
 from compax_aio.compax.program_run import check_record_number
 
-from .interruption import in_motion
+from .interruption import in_motion, say_at_end
 from .moving import TimeoutS, following, stop_interrupted, written
+from .number_words import WHOLE
 from .opening import DriveLine, Url
 from .outlets import is_held_up
 from .printing import Printing, notes_console
@@ -29,6 +30,7 @@ async def run(
     *,
     from_: Annotated[
         int | None,
+        WHOLE,
         Parameter(name="--from", help="Record to begin with, 1 to 250; if not given, where the pointer stands."),
     ] = None,
     wait: Annotated[bool, Parameter(negative=(), help="Wait until it has ended, and show the position.")] = False,
@@ -63,12 +65,12 @@ async def run(
             await stop_interrupted(drive, printing, also=_STOPPED, stop=drive.program.stop)
             raise
         if not wait:
+            told = f"{drive.name} runs its program, and nobody watches it. `compax stop` stops it."
+            say_at_end(f"Interrupted. {told}")
             drive.program.let_go_on()
-            printing.show(
-                {"drive": drive.name, "running": True},
-                f"{drive.name} runs its program, and nobody watches it. `compax stop` stops it.",
-            )
+            printing.show({"drive": drive.name, "running": True}, told)
             return
+        say_at_end(f"Interrupted. The program of {drive.name} had ended before.")
         position = await drive.position()
     printing.show(
         {"drive": drive.name, "running": False, "position": position, "unit": drive.unit},

@@ -26,6 +26,7 @@ from .files import Force, expect_free
 from .interruption import in_motion, say_at_end
 from .monitoring.wanted import WantedAxis, wanted_axes
 from .moving import stop_interrupted, written
+from .number_words import NUMBER
 from .opening import DriveLine
 from .printing import Printing, notes_console
 
@@ -61,21 +62,27 @@ async def record(
     ] = QUANTITIES,
     interval: Annotated[
         float | None,
+        NUMBER,
         Parameter(help="Seconds from one reading of a quantity to the next; if not given, as often as the line can."),
     ] = None,
     line_share: Annotated[
-        float, Parameter(help="How much of the time in which nothing else goes over the line is used, 0 to 1.")
+        float, NUMBER, Parameter(help="How much of the time in which nothing else goes over the line is used, 0 to 1.")
     ] = 1.0,
-    seconds: Annotated[float | None, Parameter(help="End after so many seconds; if not given, at Ctrl-C.")] = None,
+    seconds: Annotated[
+        float | None, NUMBER, Parameter(help="End after so many seconds; if not given, at Ctrl-C.")
+    ] = None,
     move: Annotated[
         float | None,
+        NUMBER,
         Parameter(
             allow_leading_hyphen=True,
             help="Move the axis (one only) to this position, in its unit, and end a little after it is reached.",
         ),
     ] = None,
-    speed: Annotated[float | None, Parameter(help="Of that move, in percent of nominal speed, above 0.")] = None,
-    tail: Annotated[float, Parameter(help="Seconds for which the record goes on after that move.")] = 0.5,
+    speed: Annotated[
+        float | None, NUMBER, Parameter(help="Of that move, in percent of nominal speed, above 0.")
+    ] = None,
+    tail: Annotated[float, NUMBER, Parameter(help="Seconds for which the record goes on after that move.")] = 0.5,
     settings: Annotated[
         tuple[str, ...],
         Parameter(negative=(), help="TOML file with settings for all drives, or x=FILE for one of them."),

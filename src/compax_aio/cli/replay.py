@@ -19,6 +19,7 @@ from ..recording.trace_reading import read_trace
 from .conversing import HEADING, Rows
 from .files import reading
 from .interruption import moves_nothing, say_at_end
+from .number_words import NUMBER, WHOLE
 from .printing import Printing, results_console
 
 __all__ = ["Trace", "replay"]
@@ -36,12 +37,15 @@ async def replay(
         tuple[str, ...], Parameter(negative=(), help="Show only the line of this name; may be given several times.")
     ] = (),
     session: Annotated[
-        int | None, Parameter(help="Show only this session, counted from 1.", validator=validators.Number(gte=1))
+        int | None, WHOLE, Parameter(help="Show only this session, counted from 1.", validator=validators.Number(gte=1))
     ] = None,
-    from_: Annotated[float | None, Parameter(name="--from", help="Begin at so many seconds of each session.")] = None,
-    until: Annotated[float | None, Parameter(help="End at so many seconds of each session.")] = None,
+    from_: Annotated[
+        float | None, NUMBER, Parameter(name="--from", help="Begin at so many seconds of each session.")
+    ] = None,
+    until: Annotated[float | None, NUMBER, Parameter(help="End at so many seconds of each session.")] = None,
     speed: Annotated[
         float | None,
+        NUMBER,
         Parameter(
             help="Show it in its own time, this many times as fast: 1 as it went. Without it all is shown at once.",
             validator=validators.Number(gt=0),

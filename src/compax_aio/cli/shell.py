@@ -11,6 +11,7 @@ from compax_aio import Drive
 
 from ..checked_numbers import check_number
 from ..errors import InvalidCommandError
+from .number_words import NUMBER
 from .opening import DriveLine, Url
 from .printing import Printing
 
@@ -35,6 +36,7 @@ async def shell(
     ] = False,
     poll_s: Annotated[
         float,
+        NUMBER,
         Parameter(help="Seconds between two looks at position and status, for the line at the bottom; 0: none."),
     ] = 1.0,
     history: Annotated[

@@ -13,6 +13,7 @@ from ..compax.watch import Reading
 from .asking import Asking
 from .exit_codes import INTERRUPTED
 from .interruption import moves_nothing
+from .number_words import NUMBER
 from .opening import DriveLine, Url
 from .printing import Printing
 from .standing import Standing, as_table
@@ -32,6 +33,7 @@ async def status(
     ] = False,
     interval_s: Annotated[
         float,
+        NUMBER,
         Parameter(
             name=("--interval", "-i"),
             validator=Number(gte=0.02, lte=3600),

@@ -25,6 +25,7 @@ from ..simulator.smc_hunt.traces import check_party_line
 from .conversing import begun_at
 from .files import reading
 from .interruption import moves_nothing
+from .number_words import WHOLE
 from .printing import Printing
 from .replay import Trace
 
@@ -214,7 +215,9 @@ def check(
         tuple[str, ...], Parameter(negative=(), help="Check only the line of this name; may be given several times.")
     ] = (),
     session: Annotated[
-        int | None, Parameter(help="Check only this session, counted from 1.", validator=validators.Number(gte=1))
+        int | None,
+        WHOLE,
+        Parameter(help="Check only this session, counted from 1.", validator=validators.Number(gte=1)),
     ] = None,
     printing: Printing = Printing(),  # noqa: B008 - it is frozen
 ) -> int:

@@ -22,6 +22,8 @@ from compax_aio.simulator.smc import Knobs as LineKnobs
 from compax_aio.simulator.smc import SimulatedPartyLine
 from compax_aio.simulator.smc.log import LogEntry as LineLogEntry
 
+from ..number_words import WHOLE
+
 __all__ = ["Device", "Entry", "Faults", "Place", "drives", "lines", "query_of"]
 
 Device = SimulatedDrive | SimulatedPartyLine
@@ -38,13 +40,13 @@ class Place:
 
     pty: Annotated[bool, Parameter(negative=())] = False
     """Serve each on a pseudo-terminal, as a serial port; so it is without --tcp."""
-    tcp: int | None = None
+    tcp: Annotated[int | None, WHOLE] = None
     """Serve on this TCP port, several devices on those that follow; 0: free ones."""
     host: str = "127.0.0.1"
     """Address to listen on; 0.0.0.0 lets other computers in."""
     name: str | None = None
     """What the device is called; several are this and a number."""
-    count: int = 1
+    count: Annotated[int, WHOLE] = 1
     """So many devices, all alike."""
     link: Path | None = None
     """Make a link to the pseudo-terminal with this name, which stays the same; for several, with their numbers."""
@@ -109,7 +111,7 @@ class Faults:
 
     fault: Annotated[tuple[str, ...], Parameter(negative=())] = ()
     """NAME[=CHANCE][:AMOUNT][@START[+SPAN]], again and again; `compax sim faults` lists the names."""
-    seed: int = 0
+    seed: Annotated[int, WHOLE] = 0
     """Of all chance: the same seed, the same faults."""
 
     def on(self, device: Device, outlet: Outlet, say: Callable[[str], None]) -> FarEnd:

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator, Iterable, Sequence
+from collections.abc import AsyncIterator, Iterable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Final, Literal
 
-from cyclopts import Parameter, Token
+from cyclopts import Parameter
 
 from compax_aio import CompaxError, InvalidCommandError, smc
 from compax_aio.smc.facts import NO_NAME
 from compax_aio.smc.vocabulary import check_name
 
 from ..moving import MovedSettings
+from ..number_words import NUMBER
 from ..opening import DriveLine
 
-__all__ = ["THE_ONLY", "AxisName", "AxisOnLine", "LineUrl", "SmcLine", "whole"]
+__all__ = ["THE_ONLY", "AxisName", "AxisOnLine", "LineUrl", "SmcLine"]
 
 THE_ONLY: Final = "-"
 """How the axis is called that has no name, in single mode."""
@@ -34,14 +35,6 @@ AxisName = Annotated[
 ]
 
 
-def whole(_kind: type, tokens: Sequence[Token]) -> int:
-    """Read a whole number; another one is refused instead of rounded."""
-    try:
-        return int(tokens[0].value)
-    except ValueError:
-        raise ValueError(f"{tokens[0].value!r} is no whole number") from None
-
-
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class SmcLine:
@@ -51,7 +44,7 @@ class SmcLine:
     """How the axes are switched: the input that each reads at a reset (DCB p. 20)."""
     profile: Literal["dcb-274", "im483i", "panther", "789a-4"] = "dcb-274"
     """Which member of the family they are; all axes of a line are alike."""
-    echo_timeout: float | None = None
+    echo_timeout: Annotated[float | None, NUMBER] = None
     """Seconds that the echo of a character may take, for slow adapters; 0.25 if not given."""
     name: str | None = None
     """What the line is called in messages; its URL if not given."""

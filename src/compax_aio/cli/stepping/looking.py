@@ -19,6 +19,7 @@ from compax_aio.smc.facts import POSSIBLE_NAMES
 
 from ..exit_codes import INTERRUPTED
 from ..interruption import moves_nothing
+from ..number_words import NUMBER
 from ..printing import Printing, results_console
 from ..progress import counting
 from .line import THE_ONLY, LineUrl, SmcLine
@@ -105,7 +106,9 @@ async def status(
         bool, Parameter(name=("--watch", "-w"), negative=(), help="Look again and again, until Ctrl-C.")
     ] = False,
     interval_s: Annotated[
-        float, Parameter(name=("--interval", "-i"), validator=Number(gte=0.02, lte=3600), help="Seconds between looks.")
+        float,
+        NUMBER,
+        Parameter(name=("--interval", "-i"), validator=Number(gte=0.02, lte=3600), help="Seconds between looks."),
     ] = 0.5,
     line: SmcLine = SmcLine(),  # noqa: B008 - it is frozen
     printing: Printing = Printing(),  # noqa: B008 - it is frozen

@@ -15,8 +15,9 @@ from compax_aio.smc.vocabulary import plan_home, plan_move_by, plan_move_to, pla
 from ...motion.moves import check_manner
 from ..interruption import in_motion
 from ..moving import MoveView, TimeoutS, following, stop_interrupted, written
+from ..number_words import NUMBER, WHOLE
 from ..printing import Printing
-from .line import AxisName, AxisOnLine, LineUrl, SmcLine, whole
+from .line import AxisName, AxisOnLine, LineUrl, SmcLine
 
 __all__ = ["carry_out", "home", "move", "run"]
 
@@ -28,6 +29,7 @@ async def move(
     axis: AxisName,
     position: Annotated[
         float,
+        NUMBER,
         Parameter(
             allow_leading_hyphen=True,
             help="Target in steps from the origin; with --by the distance from where it stands. It may be negative.",
@@ -62,11 +64,11 @@ async def home(
     url: LineUrl,
     axis: AxisName,
     *,
-    speed: Annotated[int, Parameter(converter=whole, help="Steps per second; begin slowly.")],
+    speed: Annotated[int, WHOLE, Parameter(help="Steps per second; begin slowly.")],
     toward: Annotated[
         Literal["plus", "minus"] | None, Parameter(help="Where the search begins, if the profile knows which that is.")
     ] = None,
-    direction: Annotated[int | None, Parameter(converter=whole, help="Else 0 or 1, as it is sent (F).")] = None,
+    direction: Annotated[int | None, WHOLE, Parameter(help="Else 0 or 1, as it is sent (F).")] = None,
     origin: Annotated[bool, Parameter(negative="--no-origin", help="Count from there on from 0.")] = True,
     timeout_s: TimeoutS = None,
     line: SmcLine = SmcLine(),  # noqa: B008 - it is frozen
@@ -98,13 +100,12 @@ async def run(
     axis: AxisName,
     speed: Annotated[
         int,
-        Parameter(
-            allow_leading_hyphen=True, converter=whole, help="Steps per second, constant; below zero toward minus."
-        ),
+        WHOLE,
+        Parameter(allow_leading_hyphen=True, help="Steps per second, constant; below zero toward minus."),
     ],
     *,
     for_s: Annotated[
-        float | None, Parameter(name="--for", help="Seconds, then it is stopped; if not given: until Ctrl-C.")
+        float | None, NUMBER, Parameter(name="--for", help="Seconds, then it is stopped; if not given: until Ctrl-C.")
     ] = None,
     line: SmcLine = SmcLine(),  # noqa: B008 - it is frozen
     printing: Printing = Printing(),  # noqa: B008 - it is frozen

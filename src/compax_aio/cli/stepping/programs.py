@@ -18,9 +18,10 @@ from ...motion.moves import check_manner
 from ..files import Force, expect_free, reading
 from ..interruption import moves_nothing
 from ..moving import TimeoutS
+from ..number_words import WHOLE
 from ..printing import Printing
 from ..progress import counting
-from .line import AxisName, LineUrl, SmcLine, whole
+from .line import AxisName, LineUrl, SmcLine
 from .motions import carry_out
 
 __all__ = ["app"]
@@ -35,7 +36,7 @@ A program is an instruction a line, R10000 or 1: R10000; what follows ; is a com
 )
 
 ProgramFile = Annotated[Path, Parameter(help="File with an instruction a line.")]
-At = Annotated[int, Parameter(name="--at", converter=whole, help="Address of the first instruction.")]
+At = Annotated[int, WHOLE, Parameter(name="--at", help="Address of the first instruction.")]
 Verify = Annotated[
     bool, Parameter(negative="--no-verify", help="List the program before and after, and compare; needs Q.")
 ]
@@ -139,7 +140,7 @@ async def write(
 async def edit(
     url: LineUrl,
     axis: AxisName,
-    address: Annotated[int, Parameter(converter=whole, help="Where the instruction begins, as `list` shows it.")],
+    address: Annotated[int, WHOLE, Parameter(help="Where the instruction begins, as `list` shows it.")],
     text: Annotated[str, Parameter(help="What shall stand there, as in R500; addresses are those of now.")],
     *,
     verify: Verify = True,
@@ -164,7 +165,7 @@ async def edit(
 async def run(
     url: LineUrl,
     axis: AxisName,
-    address: Annotated[int, Parameter(converter=whole, help="Where it begins.")] = 0,
+    address: Annotated[int, WHOLE, Parameter(help="Where it begins.")] = 0,
     *,
     timeout_s: TimeoutS = None,
     line: SmcLine = SmcLine(),  # noqa: B008 - it is frozen
