@@ -2,15 +2,6 @@
 
 from __future__ import annotations
 
-from enum import Enum
+from ...certainty import Certainty
 
 __all__ = ["Certainty"]
-
-
-class Certainty(Enum):
-    """How well a row of a table is founded."""
-
-    DOCUMENTED = "a manual says so"
-    INFERRED = "deduced from what manuals say"
-    PLACEHOLDER = "no source; a value so that something can be sent or simulated"
-    UNKNOWN = "it exists; no page that was available says what it is"
