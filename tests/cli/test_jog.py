@@ -220,7 +220,7 @@ def compax(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) 
 
 @pytest.mark.parametrize(
     ("words", "says"),
-    [((), "from a terminal only"), (("--step", "nan"), "finite"), (("--speed", "0"), "above 0")],
+    [((), "from a terminal only"), (("--step", "nan"), "no number"), (("--speed", "0"), "above 0")],
 )
 def test_without_keys_or_with_steps_that_mean_nothing_no_line_is_opened(
     compax: Commands, words: tuple[str, ...], says: str

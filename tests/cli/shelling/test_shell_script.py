@@ -23,7 +23,7 @@ URL = "sim://compax?name=x"
 
 
 @pytest.fixture
-def loop(monkeypatch: pytest.MonkeyPatch) -> VirtualClockLoop:
+def loop(monkeypatch: pytest.MonkeyPatch) -> Iterator[VirtualClockLoop]:
     """Let commands run on a virtual clock."""
     loop = VirtualClockLoop()
 
@@ -32,7 +32,8 @@ def loop(monkeypatch: pytest.MonkeyPatch) -> VirtualClockLoop:
             return runner.run(work)
 
     monkeypatch.setattr(asyncio, "run", run_virtually)
-    return loop
+    yield loop
+    loop.close()  # where a command was refused before it came to that
 
 
 @pytest.fixture
