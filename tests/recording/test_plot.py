@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import sys
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Sequence
@@ -325,6 +326,34 @@ def test_long_names_do_not_leave_the_page(making: Making, axes: int) -> None:
     expect_no_overlap(draw([record]))
 
 
+@pytest.mark.parametrize("letters", [100, 200, 500])
+def test_words_of_any_length_leave_room_for_the_curves(making: Making, letters: int) -> None:
+    long = ("word " * letters)[:letters]
+    making.axis(f"first {long}"[:200], unit=f"unit {long}", quantities=("position", "torque"))
+    making.axis(f"second {long}"[:200], quantities=("position",))
+    for axis in (f"first {long}"[:200], f"second {long}"[:200]):
+        making.samples(axis, "position", [0.0, 1.0, 2.0, 3.0])
+        making.mark(0.2, axis, long)
+        making.mark(0.3, axis, f"{long} once more"[-200:])
+        making.mark(0.3, axis, "fault", 55)
+    making.rows.append(Row(0.1, f"first {long}"[:200], Kind.MISSING, "torque", None, f"AnswerTimeoutError: {long}"))
+    figure = draw([making.record()])
+    expect_no_overlap(figure)
+    assert any("fault E55" in text for text in texts(figure)), "what is important is not cut off"
+    assert panels(figure)[0].get_position().width > 0.35
+
+
+def test_very_many_marks_of_one_moment_leave_room_for_the_curves(making: Making) -> None:
+    making.axis("x", quantities=("position",))
+    making.samples("x", "position", [float(number) for number in range(2000)])
+    for number in range(4000):
+        making.mark(number * 0.05, "x", f"word {number}")
+    figure = draw([making.record()])
+    expect_no_overlap(figure)
+    assert panels(figure)[0].get_position().width > 0.5
+    assert any(re.search(r"· \d+ more$", text) for text in texts(figure))
+
+
 # Labels in lanes ------------------------------------------------------------------------------------------------------
 
 
@@ -438,11 +467,36 @@ def test_what_cannot_be_drawn_is_refused(making: Making) -> None:
         draw([record], axes=["q"])
     with pytest.raises(InvalidCommandError, match="no time from 5 s until 5 s"):
         draw([record], from_s=5, until_s=5)
+    with pytest.raises(InvalidCommandError, match=r"nothing can be drawn from -1e\+308 s until 1e\+308 s"):
+        draw([record], from_s=-1e308, until_s=1e308)
     with pytest.raises(InvalidCommandError, match="an axis is not in what was recorded; the record was cut"):
         draw([making.record("empty")])
     making.axis("x", quantities=())
     with pytest.raises(InvalidCommandError, match="nothing to draw"):
         draw([making.record("nothing")])
+
+
+@pytest.mark.parametrize(
+    ("time_s", "value", "says"), [(1, 1e308, "x: its position of 1e.308 mm"), (1e300, 1, "until 1e")]
+)
+def test_numbers_of_no_machine_are_refused(making: Making, time_s: float, value: float, says: str) -> None:
+    making.axis("x", quantities=("position",))
+    making.samples("x", "position", [-value])
+    making.rows.append(Row(time_s, "x", Kind.SAMPLE, "position", value))
+    with pytest.raises(InvalidCommandError, match=says):
+        draw([making.record()])
+
+
+def test_records_laid_over_each_other_claim_no_common_time(making: Making) -> None:
+    making.move("x", 100)
+    first = making.record("monday")
+    making.move("x", 100)
+    second = making.record("tuesday", started=STARTED + timedelta(days=1))
+    told = " ".join(text.replace("\n", " ") for text in texts(draw([first, second], overlay=True)))
+    assert "time 0 is that of each record" in told
+    assert f"monday.csv of {STARTED:%Y-%m-%d}" in told
+    assert f"tuesday.csv of {STARTED + timedelta(days=1):%Y-%m-%d}" in told
+    assert f"time 0 is {STARTED:%Y}" not in told
 
 
 def test_without_its_library_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

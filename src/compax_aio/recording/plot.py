@@ -17,7 +17,7 @@ from ..errors import InvalidCommandError
 from ..text_file import name_of
 from .motion_reading import MotionRecord, RecordMark
 from .plot_curves import Curve, Panel, ShownAxis, Span, panels_of, shown_axes, shown_marks, thinned
-from .plot_marks import Label, labels_of, place
+from .plot_marks import Label, labels_of, place, shortened
 
 try:
     from matplotlib import rc_context
@@ -49,8 +49,15 @@ _FIRST_PANEL_IN: Final = 2.2
 _LANE_IN: Final = 0.155
 _HEAD_IN: Final = 0.95
 """Of title, time scale and legend."""
-_TITLE_LETTERS: Final = 65
+_TITLE_LETTERS: Final = 56
 _SUBTITLE_LETTERS: Final = 105
+_REASON_LETTERS: Final = 44
+_LEGEND_LETTERS: Final = 70
+_SCALE_LETTERS: Final = 32
+_MAX_LINES: Final = 4
+"""Of each text that may be long; the rest is left out."""
+_LONGEST_S: Final = 1e12
+"""Time that is shown, and how far it may be from 0: what is longer no clock has measured."""
 _LETTER_IN: Final = 0.075
 """Of the legend; few are wider."""
 _DPI: Final = 200
@@ -138,7 +145,7 @@ def draw(
         plot = _Plot(panels, looks)
         plot.draw_curves(_limits(shown, span))
         plot.draw_marks(marks, units)
-        plot.write_title(title or f"Motion of {', '.join(looks)}", _subtitle(records))
+        plot.write_title(title or f"Motion of {', '.join(looks)}", _subtitle(records, overlay=overlay))
         plot.fit()
         return plot.figure
 
@@ -188,20 +195,29 @@ def _limits(axes: Sequence[ShownAxis], span: Span) -> tuple[float, float]:
     """Return from when until when is drawn: what was asked for, else all that was recorded, and a little more."""
     begin = span.from_s if isfinite(span.from_s) else min(axis.offset_s for axis in axes)
     end = span.until_s if isfinite(span.until_s) else max(axis.offset_s + axis.record.duration_s for axis in axes)
+    if max(abs(begin), abs(end)) > _LONGEST_S:
+        raise InvalidCommandError(f"nothing can be drawn from {begin:g} s until {end:g} s")
     if end <= begin:  # a record that ended as it began, or nothing is left of it
         return begin, begin + 1.0
     margin = 0.01 * (end - begin)
     return begin - (0 if isfinite(span.from_s) else margin), end + (0 if isfinite(span.until_s) else margin)
 
 
-def _subtitle(records: Sequence[MotionRecord]) -> str:
-    starts = [record.started for record in records if record.started is not None]
-    when = f"{min(starts):%Y-%m-%d %H:%M:%S %z}" if starts else "date unknown"
-    names = ", ".join(record.path.name for record in records)
-    told = [f"time 0 is {when}", names]
+def _subtitle(records: Sequence[MotionRecord], *, overlay: bool) -> str:
+    if overlay:
+        names = (f"{record.path.name} of {_written([record])}" for record in records)
+        told = ["time 0 is that of each record", *names]
+    else:
+        told = [f"time 0 is {_written(records)}", ", ".join(record.path.name for record in records)]
     told += [f"{record.path.name} was cut" for record in records if record.cut]
     told += [f"{record.rows_lost} rows were lost" for record in records if record.rows_lost]
     return "   ".join(told)
+
+
+def _written(records: Sequence[MotionRecord]) -> str:
+    """Write when the first of *records* was started."""
+    starts = [record.started for record in records if record.started is not None]
+    return f"{min(starts):%Y-%m-%d %H:%M:%S %z}" if starts else "date unknown"
 
 
 def _columns(handles: Sequence[Line2D]) -> int:
@@ -244,7 +260,7 @@ class _Plot:
         """Draw all curves; *limits* are those of time."""
         self._areas[0].set_xlim(*limits)
         for panel, area in zip(self._panels, self._areas, strict=True):
-            area.set_ylabel(panel.title, wrap=True)
+            area.set_ylabel(shortened(panel.title, _SCALE_LETTERS), wrap=True)
             for curve in panel.curves:
                 self._draw_curve(area, thinned(curve, _SLICES))
             if panel.missing:
@@ -252,12 +268,11 @@ class _Plot:
                 area.text(
                     0.5,
                     0.5,
-                    panel.missing,
+                    fill(panel.missing, _REASON_LETTERS, max_lines=_MAX_LINES, placeholder=" …"),
                     transform=area.transAxes,
                     ha="center",
                     va="center",
                     color=_NEUTRAL,
-                    wrap=True,
                 )
         self._write_legend()
 
@@ -284,7 +299,8 @@ class _Plot:
 
     def _write_legend(self) -> None:
         handles = [
-            Line2D([], [], color=look.colour, linestyle=look.dashes, label=axis) for axis, look in self._looks.items()
+            Line2D([], [], color=look.colour, linestyle=look.dashes, label=shortened(axis, _LEGEND_LETTERS))
+            for axis, look in self._looks.items()
         ]
         if any(curve.is_target for panel in self._panels for curve in panel.curves):
             handles.append(Line2D([], [], color=_NEUTRAL, linestyle=(0, (2, 1.5)), linewidth=0.9, label="target"))
@@ -309,10 +325,9 @@ class _Plot:
 
     def write_title(self, title: str, subtitle: str) -> None:
         """Write the title of the figure, and smaller below it when and where it is from."""
-        lines = wrap(subtitle, _SUBTITLE_LETTERS)
-        self._strip.set_title(
-            fill(title, _TITLE_LETTERS), fontsize=10, fontweight="bold", loc="left", pad=5 + 9 * len(lines)
-        )
+        lines = wrap(subtitle, _SUBTITLE_LETTERS, max_lines=_MAX_LINES, placeholder=" …")
+        heading = fill(title, _TITLE_LETTERS, max_lines=_MAX_LINES, placeholder=" …")
+        self._strip.set_title(heading, fontsize=10, fontweight="bold", loc="left", pad=5 + 9 * len(lines))
         self._strip.annotate(
             "\n".join(lines), (0, 1), xycoords="axes fraction", xytext=(0, 4), textcoords="offset points", fontsize=7,
             color=_NEUTRAL,

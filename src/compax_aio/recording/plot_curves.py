@@ -17,6 +17,9 @@ _BESIDE: Final = {"target": "position"}
 """Quantities that are drawn in the panel of another one."""
 _TITLES: Final = {"following_error": "following error"}
 
+_LARGEST: Final = 1e100
+"""No scale can be made of larger numbers, and no machine has them."""
+
 _ENVELOPE: Final = 4
 """Points that are kept of each slice of time: the first, the lowest, the highest, the last."""
 
@@ -144,6 +147,11 @@ def _curve(shown: ShownAxis, trace: Trace, span: Span) -> Curve:
     else:
         points = [point for point in points if point[0] < span.from_s][-1:]
         points = points if trace.quantity in _BESIDE else []
+    largest = max((abs(value) for _, value in points if not isnan(value)), default=0.0)
+    if largest > _LARGEST:
+        raise InvalidCommandError(
+            f"{shown.label}: its {trace.quantity} of {largest:g} {trace.unit} is more than can be drawn"
+        )
     return Curve(shown.label, trace.quantity, tuple(at for at, _ in points), tuple(value for _, value in points))
 
 

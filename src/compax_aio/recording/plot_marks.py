@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import takewhile
 from typing import Final
 
 from .motion_reading import RecordMark
 
-__all__ = ["Label", "PlacedLabel", "labels_of", "place"]
+__all__ = ["Label", "PlacedLabel", "labels_of", "place", "shortened"]
 
 _MAX_LANES: Final = 9
 _SEPARATOR: Final = " · "
+_LONGEST_TEXT: Final = 48
+_LONGEST_WORD: Final = 36
+_LONGEST_AXIS: Final = 24
+"""Letters of a label, of each of its words, of the name of its axis: panels become narrower for what is longer."""
 _IMPORTANT: Final = (
     "fault",
     "ended by fault",
@@ -96,15 +100,38 @@ def labels_of(
             groups.append((axis, newest[axis]))
     labels = []
     for axis, group in groups:
-        words = list(dict.fromkeys(_words(mark, unit_of(axis)) for mark in group))
-        if any(word.startswith("reached") for word in words) and "$" in words:
-            words.remove("$")
-        if any(word.startswith("stopped") for word in words) and "standstill" in words:
-            words.remove("standstill")
-        text = _SEPARATOR.join(words)
-        prefix = f"{axis}: " if names_axes and axis else ""
-        labels.append(Label(group[0].time_s, axis, prefix + text, min(_rank(mark.word) for mark in group)))
+        ranks: dict[str, int] = {}
+        for mark in group:
+            ranks.setdefault(shortened(_words(mark, unit_of(axis)), _LONGEST_WORD), _rank(mark.word))
+        if any(word.startswith("reached") for word in ranks):
+            ranks.pop("$", None)
+        if any(word.startswith("stopped") for word in ranks):
+            ranks.pop("standstill", None)
+        prefix = f"{shortened(axis, _LONGEST_AXIS)}: " if names_axes and axis else ""
+        labels.append(Label(group[0].time_s, axis, prefix + _joined(ranks), min(_rank(mark.word) for mark in group)))
     return labels
+
+
+def _joined(ranks: Mapping[str, int]) -> str:
+    """Join words; where there is no room for all, the most important ones, and how many more there are."""
+    text = _SEPARATOR.join(ranks)
+    if len(text) <= _LONGEST_TEXT:
+        return text
+    kept: set[str] = set()
+    for word in sorted(ranks, key=ranks.__getitem__):
+        if kept and sum(map(len, kept)) + len(word) > _LONGEST_TEXT - len(" · 99 more"):
+            break
+        kept.add(word)
+    more = [f"{len(ranks) - len(kept)} more"] if len(kept) < len(ranks) else []
+    return _SEPARATOR.join([word for word in ranks if word in kept] + more)
+
+
+def shortened(text: str, letters: int) -> str:
+    """Leave out the middle of what is longer: names often differ at their ends alone."""
+    if len(text) <= letters:
+        return text
+    end = letters // 2
+    return f"{text[: letters - end - 1].rstrip()}…{text[-end:].lstrip()}"
 
 
 def place(
