@@ -1,0 +1,42 @@
+"""The numbers of an instruction."""
+
+from __future__ import annotations
+
+import re
+from typing import Final
+
+__all__ = ["numbers", "written_number"]
+
+_SIGNS: Final = b"0123456789+-., \t\r\n\f\v"
+_SEPARATOR: Final = re.compile(rb"\s*,\s*|\s+")
+
+
+def numbers(arguments: bytes) -> list[float]:
+    """
+    Read decimal numbers with commas or blanks between them.
+
+    Raises:
+        ValueError: Something else stands there; its text is what.
+    """
+    if arguments.translate(None, _SIGNS):
+        raise ValueError(arguments.decode("latin-1").strip())
+    try:
+        return list(map(float, arguments.split(b",")))
+    except ValueError:
+        return _read_slowly(arguments.strip())
+
+
+def _read_slowly(text: bytes) -> list[float]:
+    values = []
+    for each in _SEPARATOR.split(text) if text else ():
+        try:
+            values.append(float(each))
+        except ValueError:
+            raise ValueError(each.decode("latin-1") or "nothing between two commas") from None
+    return values
+
+
+def written_number(value: float) -> str:
+    """Write a number of a cutting language: whole ones without a point, others with three decimals at most."""
+    text = f"{value:.3f}".rstrip("0").rstrip(".")
+    return "0" if text in ("-0", "") else text
