@@ -58,6 +58,40 @@ def test_what_is_asked_for_before_there_is_a_loop_counts_from_the_first_line(
     assert faults.happened == [(4.0, "drive: fault E55")]
 
 
+def test_a_fault_that_was_not_due_when_a_loop_ended_befalls_the_next_one(
+    simulated_drive: SimulatedAxis, faults: Faults, virtual_time: VirtualTime
+) -> None:
+    faults.at(1.0).silent(for_s=2)
+    faults.at(9.0).deaf()
+
+    async def application(target: float) -> None:
+        async with compax_aio.connect(simulated_drive.url) as drive:
+            await drive.move_to(target)
+
+    asyncio.run(application(1))
+    assert virtual_time.now < 1
+    assert faults.happened == []
+
+    async def looks_on() -> tuple[bool, bool]:
+        async with compax_aio.connect(simulated_drive.url):
+            await asyncio.sleep(1.5 - virtual_time.now)
+            return simulated_drive.far_end.silent, virtual_time.now > 1
+
+    assert asyncio.run(looks_on()) == (True, True)
+    assert faults.happened == [(1.0, "drive: silent")]
+
+    async def waits() -> None:
+        with pytest.raises(compax_aio.AnswerTimeoutError):
+            await compax_aio.connect(simulated_drive.url, settings=DriveSettings(answer_timeout_s=0.1))
+        await asyncio.sleep(3.1 - virtual_time.now)
+        assert not simulated_drive.far_end.silent, "it was to last two seconds"
+
+    asyncio.run(waits())
+    assert not simulated_drive.far_end.deaf
+    with pytest.raises(AssertionError, match="has not happened before the test was over: drive: deaf"):
+        faults.assert_all_happened()
+
+
 async def test_a_line_that_is_cut_comes_back(simulated_drive: SimulatedAxis, faults: Faults) -> None:
     async with compax_aio.connect(simulated_drive.url, name="x") as x:
         move = x.move_to(900)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Final
 
@@ -35,6 +35,16 @@ class Due:
             raise ValueError(f"a time is 0 s or later, not {self.seconds}")
 
 
+@dataclass(slots=True, eq=False)
+class _Timer:
+    """What is to be called at a time of an event loop; if that loop ends before, in the next one."""
+
+    loop: asyncio.AbstractEventLoop
+    when: float
+    call: Callable[[], None]
+    handle: asyncio.TimerHandle = field(init=False)
+
+
 class Stage:
     """
     All simulated drives of one test.
@@ -51,7 +61,7 @@ class Stage:
         self.failures: list[Exception] = []
         self._waiting: dict[object, str] = {}
         self._early: list[tuple[Due, str, Callable[[], None], object]] = []
-        self._timers: list[asyncio.TimerHandle] = []
+        self._timers: list[_Timer] = []
         self._origins: dict[asyncio.AbstractEventLoop, float] = {}
 
     @classmethod
@@ -82,7 +92,7 @@ class Stage:
                 f"this test has no simulated drive {url.host!r}",
                 hint=f"there are {', '.join(self.group) or 'none'}; simulated_group.add({url.host!r}) adds one",
             )
-        self._let_early_ones_happen()
+        self._go_on_here()
         return await self.group[url.host].line.open(protocol_factory)
 
     # Faults -------------------------------------------------------------------------------------------------------
@@ -116,12 +126,13 @@ class Stage:
     def later(self, seconds: float | None, action: Callable[[], None]) -> None:
         """Let *action* end a fault after so many seconds; None: it is left to the end of the test."""
         if seconds is not None:
-            self._timers.append(asyncio.get_running_loop().call_later(seconds, action))
+            loop = asyncio.get_running_loop()
+            self._call_at(loop, loop.time() + seconds, action)
 
     def undo(self) -> None:
         """Forget faults that wait, and end those that last: every drive answers, and every line can be opened."""
         for timer in self._timers:
-            timer.cancel()
+            timer.handle.cancel()
         self._timers.clear()
         self._early.clear()
         self._waiting.clear()
@@ -137,9 +148,22 @@ class Stage:
         """Return the test's time in *loop*: that of a virtual clock, else counted from when the loop was first seen."""
         return loop.time() - self._origins.setdefault(loop, 0.0 if isinstance(loop, VirtualClockLoop) else loop.time())
 
-    def _let_early_ones_happen(self) -> None:
+    def _call_at(self, loop: asyncio.AbstractEventLoop, when: float, call: Callable[[], None]) -> None:
+        timer = _Timer(loop, when, call)
+        timer.handle = loop.call_at(when, self._due, timer)
+        self._timers.append(timer)
+
+    def _due(self, timer: _Timer) -> None:
+        self._timers.remove(timer)
+        timer.call()
+
+    def _go_on_here(self) -> None:
+        """Let happen here what was to happen before any loop ran, or in one that has ended since: time goes on."""
         loop = asyncio.get_running_loop()
         self.clock(loop)
+        for timer in [timer for timer in self._timers if timer.loop.is_closed()]:
+            self._timers.remove(timer)
+            self._call_at(loop, timer.when, timer.call)
         early, self._early = self._early, []
         for due, what, action, token in early:
             self._schedule_in(loop, due, what, action, token)
@@ -151,7 +175,7 @@ class Stage:
         if delay_s <= 0:
             self._happen(what, action, token)
         else:
-            self._timers.append(loop.call_later(delay_s, partial(self._happen, what, action, token)))
+            self._call_at(loop, loop.time() + delay_s, partial(self._happen, what, action, token))
 
     def _happen(self, what: str, action: Callable[[], None], token: object) -> None:
         self._waiting.pop(token, None)
