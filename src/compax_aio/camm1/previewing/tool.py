@@ -144,13 +144,15 @@ class Tool:
         self._remarks.setdefault(what, Remark(what, self.place))
 
     def drawing(self) -> Drawing:
-        """Return all that was drawn."""
+        """Return all that was drawn, now that it is at its end."""
+        ends_down = self.is_down
+        self.lift()
         return Drawing(
             strokes=tuple(self._strokes),
             boxes=tuple(self._boxes),
             remarks=tuple(self._remarks.values()),
             end=self.at,
-            ends_down=self.is_down,
+            ends_down=ends_down,
             vectors=self.vectors,
             feed_mm=self.feed_mm,
             waymarks=self._waymarks,

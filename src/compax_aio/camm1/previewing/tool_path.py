@@ -7,6 +7,8 @@ from math import cos, radians, sin
 from typing import Final, NamedTuple
 
 from ..language.instruction import Instruction, Language
+from ..language.numbers import numbers
+from ..language.stripping import stripped
 from .drawing import Drawing, Place, Point
 from .frame import Frame
 from .lettering import Lettering
@@ -34,8 +36,7 @@ def drawing_of(instructions: Iterable[Instruction]) -> Drawing:
     path = _ToolPath()
     for each in instructions:
         path.take(each)
-    path.tool.lift()
-    return path.drawing()
+    return path.tool.drawing()
 
 
 class _ToolPath:
@@ -51,23 +52,24 @@ class _ToolPath:
         """While one is defined: its rings."""
         self._last_polygon: list[list[Point]] = []
 
-    def drawing(self) -> Drawing:
-        return self.tool.drawing()
-
     def take(self, instruction: Instruction) -> None:
         """Carry out one instruction."""
-        name = instruction.name
         language = instruction.language
         if language is Language.BLANK or language is Language.CONTROL:  # no machine draws by them
             return
-        tool = self.tool
+        if instruction.holds_control:
+            without = stripped(instruction)
+            if without is None:
+                return
+            instruction = without
+        tool, name = self.tool, instruction.name
         tool.begin(Place(instruction.place, instruction.line, instruction.column))
         method = _METHODS.get(name)
         if method is not None:
+            arguments = instruction.arguments
             try:
-                arguments = instruction.arguments
-                numbers = () if name in _OF_TEXT else tuple(map(float, arguments.replace(b",", b" ").split()))
-                method(self, _Told(name, numbers, arguments))
+                told = tuple(numbers(arguments)) if arguments and name not in _OF_TEXT else ()
+                method(self, _Told(name, told, arguments))
             except (IndexError, OverflowError, ValueError, ZeroDivisionError):
                 tool.remark(f"{name} with too few numbers, or such that make no sense, is not drawn")
         elif (why := _NOT_DRAWN.get(name)) is not None:
