@@ -7,10 +7,16 @@ from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     from ..certainty import Certainty
+    from .previewing.drawing import Drawing
+    from .previewing.preview import preview
 
-__all__ = ["Certainty"]
+__all__ = ["Certainty", "Drawing", "preview"]
 
-_HOMES: Final[dict[str, tuple[str, ...]]] = {"..certainty": ("Certainty",)}
+_HOMES: Final[dict[str, tuple[str, ...]]] = {
+    "..certainty": ("Certainty",),
+    ".previewing.drawing": ("Drawing",),
+    ".previewing.preview": ("preview",),
+}
 """Where each name is; whoever adds a module adds its names here, in __all__, and above."""
 
 
