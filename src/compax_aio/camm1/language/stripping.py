@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from typing import Final
 
 from ..facts.instructions import CONTROL_INSTRUCTIONS
@@ -41,4 +40,4 @@ def stripped(instruction: Instruction) -> Instruction | None:
         )
     )
     first = len(front)
-    return replace(instruction, data=front + arguments + end, first=first, last=first + len(arguments))
+    return instruction._replace(data=front + arguments + end, first=first, last=first + len(arguments))

@@ -134,30 +134,37 @@ class Tokeniser:
 
     def _take_plain(self, found: list[Instruction]) -> None:
         """Take as many as there are of the two usual forms."""
-        held, at, add = self._held, self._at, found.append
-        while self._language is not Language.ONE:
-            match = _PLAIN_TWO.match(held, at)
-            if match is None:
-                break
-            name = (_PLAIN_NAMES_IN_MODE_1 if self._in_mode_1 else _PLAIN_NAMES).get(match[2])
-            if name is None:
-                break
-            begin, end = match.end(1) - at, match.end()
-            add(self._cut((at, end), name, Language.TWO, (begin, begin + 2, end - 1 - at)))
-            self._in_mode_1 = False
+        at = self._at
+        if self._language is not Language.ONE:
+            names = _PLAIN_NAMES_IN_MODE_1 if self._in_mode_1 else _PLAIN_NAMES
+            at = self._take_rows(found, _PLAIN_TWO, names, Language.TWO)
+            self._in_mode_1 = self._in_mode_1 and at == self._at
+            self._at = at
+        if self._language is not Language.TWO:
+            at = self._take_rows(found, _PLAIN_ONE, _PLAIN_LETTERS, Language.ONE)
+            self._in_mode_1 = self._in_mode_1 or at != self._at
+            self._at = at
+
+    def _take_rows(
+        self, found: list[Instruction], pattern: re.Pattern[bytes], names: dict[bytes, str], language: Language
+    ) -> int:
+        """Take as many as there are of one form; return where the next begins."""
+        held, longest, offset = self._held, self._longest, self._offset
+        at, line, line_begins = self._at, self._line, self._line_begins
+        add, match_at = found.append, pattern.match
+        while (match := match_at(held, at)) and (name := names.get(match[2])):
+            begin, first = match.span(2)
+            last, end = match.end(3), match.end()
+            data = match[0]
+            if b"\n" in data or b"\r" in data or end - at > longest:
+                add(self._cut((at, end), name, language, (begin - at, first - at, last - at)))
+                line, line_begins = self._line, self._line_begins
+            else:
+                column = offset + begin - line_begins + 1
+                add(_new((data, name, language, offset + at, line, column, begin - at, first - at, last - at, True)))
+                self._after_cr = False
             at = end
-        while self._language is not Language.TWO:
-            match = _PLAIN_ONE.match(held, at)
-            if match is None:
-                break
-            name = _PLAIN_LETTERS.get(match[2])
-            if name is None:
-                break
-            begin, end = match.end(1) - at, match.end()
-            add(self._cut((at, end), name, Language.ONE, (begin, begin + 1, end - 1 - at)))
-            self._in_mode_1 = True
-            at = end
-        self._at = at
+        return at
 
     # One instruction, the longer way --------------------------------------------------------------------------------
 
@@ -384,5 +391,6 @@ class Tokeniser:
         )
 
 
+_new: Final = Instruction._make
 _QUOTE: Final = 0x22
 _BLANKS_ONLY: Final = re.compile(rb"\s*")
