@@ -14,9 +14,10 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, FastAPI, HTTPException, Query, Request
 from fastapi.responses import JSONResponse, StreamingResponse
-from pydantic import BaseModel
+from pydantic import BaseModel, ConfigDict
 
 import compax_aio
+from compax_aio.compax.watch import Reading
 
 SIMULATED = ["x=sim://compax?machine_zero=-40", "y=sim://compax?machine_zero=-25"]
 
@@ -35,8 +36,14 @@ HTTP_CODES: list[tuple[type[compax_aio.CompaxError], int]] = [
 ]
 
 
+OLD_AFTER_S = 1.0
+"""So much later than it was due, a reading says nothing of where an axis is now."""
+
+
 class Target(BaseModel):
     """Where to go; positions are in the axis's own unit, from machine zero."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)  # "sped_percent" would be a move at any speed
 
     position: float
     speed_percent: float | None = None
@@ -101,19 +108,22 @@ class Cell:
         return {"axis": name, "move": ended, "target": move.target, "error": str(error) if error else None}
 
     async def positions(self, interval_s: float) -> AsyncIterator[str]:
-        """Give the positions of all axes as events; clients share one poller a drive, and a slow one the newest."""
+        """Give the positions of all axes as events, null for one that does not answer; clients share one poller."""
+        loop, old_after_s = asyncio.get_running_loop(), interval_s + OLD_AFTER_S
+        readings: Mapping[str, Reading] = {}
         with self.open_group.watch("position", interval_s=interval_s) as watch:
             while not self.ending.is_set():
                 news = asyncio.ensure_future(anext(watch))
                 ending = asyncio.ensure_future(self.ending.wait())
                 try:
-                    await asyncio.wait([news, ending], return_when=asyncio.FIRST_COMPLETED)
-                    if news.done():
-                        readings = {name: reading.values.get("position") for name, reading in news.result().items()}
-                        yield f"data: {json.dumps(readings)}\n\n"
+                    await asyncio.wait([news, ending], timeout=old_after_s, return_when=asyncio.FIRST_COMPLETED)
+                    readings = news.result() if news.done() else readings
                 finally:
                     news.cancel()
                     ending.cancel()
+                now = {axis: reading for axis, reading in readings.items() if loop.time() - reading.at < old_after_s}
+                told = {axis: now[axis].values.get("position") if axis in now else None for axis in self.urls}
+                yield f"data: {json.dumps(told)}\n\n"
 
 
 async def cell_of(request: Request) -> Cell:

@@ -101,6 +101,9 @@ async def test_one_axis_is_stopped_or_all(simulated_group: SimulatedGroup) -> No
         ("/axes/x/move", {"position": 9e9}, 422, "within ±4,000,000 units"),
         ("/axes/x/move", {"position": "up"}, 422, "valid number"),
         ("/axes/x/move", {"position": 1, "speed_percent": -1}, 422, "speed"),
+        ("/axes/x/move", {"position": 1, "sped_percent": 5}, 422, "sped_percent"),
+        ("/axes/x/move", {"position": True}, 422, "valid number"),
+        ("/axes/x/move", {"position": "12"}, 422, "valid number"),
         ("/positions?interval_s=0", None, 405, "Not Allowed"),
     ],
 )
@@ -170,9 +173,9 @@ async def test_a_line_that_is_lost_is_told(simulated_group: SimulatedGroup, faul
 
 
 @asynccontextmanager
-async def stream(app: FastAPI) -> AsyncIterator[list[dict[str, float]]]:
+async def stream(app: FastAPI) -> AsyncIterator[list[dict[str, Any]]]:
     """Follow the positions as a server lets a client do that hangs up in the end; httpx waits for the last byte."""
-    seen: list[dict[str, float]] = []
+    seen: list[dict[str, Any]] = []
     hung_up = asyncio.Event()
 
     async def receive() -> dict[str, Any]:
@@ -207,6 +210,24 @@ async def test_positions_are_followed_by_any_number_of_clients(simulated_group: 
         lines = len(simulated_group["x"].lines)
         await asyncio.sleep(5)
         assert len(simulated_group["x"].lines) == lines, "it is read although nobody looks"
+
+
+@pytest.mark.parametrize("cut", ["x", "xy"])
+async def test_the_stream_gives_no_old_position_for_one_of_now(
+    simulated_group: SimulatedGroup, faults: Faults, cut: str
+) -> None:
+    async with service(simulated_group) as (client, app), stream(app) as seen:
+        await client.post("/axes/x/move?wait=true", json={"position": 100})
+        for axis in cut:
+            faults.of(axis).cut_line(for_s=5)
+        await asyncio.sleep(2)
+        assert seen[-1] == {"x": None, "y": None if "y" in cut else 0.0}
+        await asyncio.sleep(1)
+        before = len(seen)
+        await asyncio.sleep(2.5)
+        assert len(seen) > before + 1, "it goes on"
+        await asyncio.sleep(15)
+        assert seen[-1] == {"x": 100.0, "y": 0.0}
 
 
 # The end
