@@ -191,6 +191,22 @@ class _Flag:
             await self._event.wait()
 
 
+async def test_a_drive_that_falls_silent_is_not_shown_as_if_it_stood(tmp_path: Path) -> None:
+    drive = SimulatedDrive(Knobs(position=12.5))
+
+    def talk(child: Any) -> None:
+        child.expect("12.500")
+        drive.silent = True
+        child.expect(r"No answer for \d+ s: what is above is OLD")
+        drive.silent = False
+        child.expect("12.500")
+        child.sendintr()
+
+    async with serve_tcp(drive) as url:
+        code, _ = await looked("status", url, "--watch", "--interval", "0.2", talk=talk)
+    assert code == 130
+
+
 @pytest.mark.parametrize("command", ["probe", "info"])
 async def test_ctrl_c_while_nobody_answers(command: str) -> None:
     drive = SimulatedDrive()

@@ -163,6 +163,19 @@ def test_a_line_that_is_lost_and_back_is_told_and_survived(compax: Commands) -> 
     assert outcome.code == 130
 
 
+def test_of_a_drive_that_falls_silent_nothing_is_told_that_it_did_not_say(compax: Commands) -> None:
+    drive = compax.drive("x")
+    compax.after(1.1, lambda: setattr(drive, "silent", True))
+    compax.after(20.0, lambda: setattr(drive, "silent", False))
+    compax.after(30.0, interrupt)
+    outcome = compax("status", "sim://compax?name=x", "--watch", "--json")
+    readings = [each for each in outcome.documents if "event" not in each]
+    silent = [each for each in readings if each["position"] is None]
+    assert silent, "a program is told that nothing came"
+    assert all(each["refused"]["position"].startswith("no ") for each in silent)
+    assert readings[-1]["position"] == 0.0
+
+
 def test_a_line_that_is_given_up_ends_the_watch(compax: Commands, tmp_path: Path) -> None:
     drive = compax.drive("x")
     settings = tmp_path / "x.toml"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Final
 
 from rich.console import Group, RenderableType
 from rich.live import Live
@@ -17,6 +18,10 @@ from .printing import Printing, results_console
 from .standing import Standing, as_line, as_table
 
 __all__ = ["LineNews", "follow"]
+
+_LATE_S: Final = 2.0
+"""So much later than it was due, a reading is shown as one of the past."""
+_LOOK_S: Final = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,9 +44,12 @@ class _Display:
         self.live = Live(console=console, auto_refresh=False) if is_live else None
         self._shown: RenderableType = Text("waiting for the first reading")
         self._news = Text("")
+        self._age = Text("")
+        self._read_at: float | None = None
 
     def show(self, standing: Standing) -> None:
         """Show a reading."""
+        self._read_at = asyncio.get_running_loop().time()
         if self.live is None:
             self._printing.show(standing, as_line(standing))
         else:
@@ -57,10 +65,23 @@ class _Display:
             self._news = Text(news.text, style="bold red" if is_lost else "green")
             self._draw()
 
+    async def tell_age(self, interval_s: float) -> None:
+        """Say all the while how old the last reading is, where no other comes: a silent drive may be moving."""
+        loop, told = asyncio.get_running_loop(), False
+        while True:
+            await asyncio.sleep(_LOOK_S)
+            late_s = 0.0 if self._read_at is None else loop.time() - self._read_at - interval_s
+            if (is_late := late_s > _LATE_S) or told:
+                self._age = Text(
+                    f"No answer for {late_s + interval_s:.0f} s: what is above is OLD." * is_late, "bold red"
+                )
+                self._draw()
+            told = is_late
+
     def _draw(self) -> None:
         if self.live is not None:
             foot = Text("Ctrl-C ends this; the drive is only asked.", style="dim")
-            self.live.update(Group(self._shown, Text(""), self._news, foot), refresh=True)
+            self.live.update(Group(self._shown, Text(""), self._news, self._age, foot), refresh=True)
 
 
 async def follow(
@@ -87,13 +108,13 @@ async def _follow(
     display: _Display,
 ) -> None:
     async with asyncio.TaskGroup() as tasks:
-        listening = tasks.create_task(_listen(drive, display))
+        beside = [tasks.create_task(_listen(drive, display)), tasks.create_task(display.tell_age(interval_s))]
         try:
             async for reading in drive.watch(*quantities, interval_s=interval_s):
-                if reading.values:
-                    display.show(of(reading, drive.unit))
+                display.show(of(reading, drive.unit))
         finally:
-            listening.cancel()
+            for task in beside:
+                task.cancel()
 
 
 async def _listen(drive: Drive, display: _Display) -> None:
