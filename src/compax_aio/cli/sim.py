@@ -14,6 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from compax_aio.errors import InvalidCommandError
+from compax_aio.simulator.camm1 import Knobs as CutterKnobs
 from compax_aio.simulator.compax import Knobs
 from compax_aio.simulator.far_end import FarEnd
 from compax_aio.simulator.knob_descriptions import describe_knobs
@@ -23,7 +24,7 @@ from compax_aio.simulator.smc import Knobs as LineKnobs
 from .exit_codes import OK
 from .interruption import moves_nothing
 from .printing import Printing
-from .simulating.devices import Device, Faults, Place, drives, lines
+from .simulating.devices import Device, Faults, Place, cutters, drives, lines
 from .simulating.hands import Hands
 from .simulating.prompt import listen, pasted_above_prompt
 from .simulating.view import SimView
@@ -44,7 +45,7 @@ standard input, and read `--json`.
 KnobWords = Annotated[str, Parameter(help="KNOB=VALUE …; `compax sim knobs` lists them.")]
 Quiet = Annotated[bool, Parameter(negative=(), help="Do not show what the far end sees.")]
 
-_KINDS: Final[Mapping[str, type]] = {"compax": Knobs, "smc": LineKnobs}
+_KINDS: Final[Mapping[str, type]] = {"compax": Knobs, "smc": LineKnobs, "camm1": CutterKnobs}
 
 
 @app.command(name="compax")
@@ -67,7 +68,7 @@ async def serve_compax(
     compax sim compax --fault unplug@30s+5s --fault E55@60s
     ```
     """
-    return await _serve(drives(knobs, place), place, faults, printing, is_quiet=quiet)
+    return await _serve(drives(knobs, place), place, faults, printing, is_quiet=quiet, look="status")
 
 
 @app.command(name="smc")
@@ -87,13 +88,35 @@ async def serve_smc(
     compax sim smc mode=single --tcp 4001
     ```
     """
-    return await _serve(lines(knobs, place, faults.seed), place, faults, printing, is_quiet=quiet)
+    return await _serve(lines(knobs, place, faults.seed), place, faults, printing, is_quiet=quiet, look="smc scan")
+
+
+@app.command(name="camm1")
+@moves_nothing
+async def serve_camm1(
+    *knobs: KnobWords,
+    quiet: Quiet = False,
+    place: Place = Place(),  # noqa: B008 - it is frozen
+    faults: Faults = Faults(),  # noqa: B008 - it is frozen
+    printing: Printing = Printing(),  # noqa: B008 - it is frozen
+) -> int:
+    """
+    Serve a CAMM-1 cutter, or several.
+
+    Type `pause`, `setup`, `cancel`, `view` or `lever up` to press the keys of its panel.
+
+    ```sh
+    compax sim camm1 baudrate=9600
+    compax sim camm1 model=PNC-900 physical_size=256 --link /tmp/cutter
+    ```
+    """
+    return await _serve(cutters(knobs, place, faults.seed), place, faults, printing, is_quiet=quiet, look="camm1 info")
 
 
 async def _serve(
-    devices: dict[str, Device], place: Place, faults: Faults, printing: Printing, *, is_quiet: bool
+    devices: dict[str, Device], place: Place, faults: Faults, printing: Printing, *, is_quiet: bool, look: str
 ) -> int:
-    """Serve *devices* until somebody ends it; returns the exit code."""
+    """Serve *devices*, at which the command *look* looks, until somebody ends it; returns the exit code."""
     loop = asyncio.get_running_loop()
     view = SimView(printing, is_quiet=is_quiet, began_at=loop.time())
     far_ends: dict[str, FarEnd] = {}
@@ -108,7 +131,7 @@ async def _serve(
         is_conversation = around.enter_context(pasted_above_prompt(wanted=not printing.json))
         async with AsyncExitStack() as serving:
             urls = {name: await serving.enter_async_context(each.served()) for name, each in far_ends.items()}
-            _show_urls(urls, place, printing, is_conversation=is_conversation)
+            _show_urls(urls, place, printing, is_conversation=is_conversation, look=look)
             view.watch(devices)
             for each in far_ends.values():
                 each.start_timetable()
@@ -118,13 +141,13 @@ async def _serve(
     return OK
 
 
-def _show_urls(urls: Mapping[str, str], place: Place, printing: Printing, *, is_conversation: bool) -> None:
+def _show_urls(urls: Mapping[str, str], place: Place, printing: Printing, *, is_conversation: bool, look: str) -> None:
     width = max(map(len, urls))
     printing.show({"urls": urls}, "\n".join(f"{name:{width}}  {url}" for name, url in urls.items()))
     if place.host not in {"127.0.0.1", "::1", "localhost"} and place.tcp is not None:
         printing.note(f"Whoever reaches {place.host} can talk to these devices: there is no password on such a line.")
     ending = "type help, or Ctrl-C to end" if is_conversation else "Ctrl-C ends"
-    printing.note(f"Try `compax status {next(iter(urls.values()))}` in another terminal; {ending}.")
+    printing.note(f"Try `compax {look} {next(iter(urls.values()))}` in another terminal; {ending}.")
 
 
 async def _until_end(hands: Hands, printing: Printing, *, is_conversation: bool) -> None:
@@ -136,7 +159,7 @@ async def _until_end(hands: Hands, printing: Printing, *, is_conversation: bool)
 @app.command
 @moves_nothing
 def knobs(
-    kind: Annotated[str, Parameter(help="compax or smc")],
+    kind: Annotated[str, Parameter(help="compax, smc or camm1")],
     *,
     printing: Printing = Printing(),  # noqa: B008 - it is frozen
 ) -> None:
@@ -146,6 +169,7 @@ def knobs(
     ```sh
     compax sim knobs compax
     compax sim knobs smc
+    compax sim knobs camm1
     ```
     """
     if kind not in _KINDS:

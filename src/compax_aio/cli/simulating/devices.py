@@ -12,6 +12,9 @@ from typing import Annotated, Any, Final
 from cyclopts import Parameter
 
 from compax_aio.errors import InvalidCommandError, TransportError
+from compax_aio.simulator.camm1 import Knobs as CutterKnobs
+from compax_aio.simulator.camm1 import LogEntry as CutterLogEntry
+from compax_aio.simulator.camm1 import SimulatedCutter
 from compax_aio.simulator.compax import Knobs, SimulatedDrive
 from compax_aio.simulator.compax.log import LogEntry
 from compax_aio.simulator.far_end import FarEnd
@@ -24,10 +27,10 @@ from compax_aio.simulator.smc.log import LogEntry as LineLogEntry
 
 from ..number_words import WHOLE
 
-__all__ = ["Device", "Entry", "Faults", "Place", "drives", "lines", "query_of"]
+__all__ = ["Device", "Entry", "Faults", "Place", "cutters", "drives", "lines", "query_of"]
 
-Device = SimulatedDrive | SimulatedPartyLine
-Entry = LogEntry | LineLogEntry
+Device = SimulatedDrive | SimulatedPartyLine | SimulatedCutter
+Entry = LogEntry | LineLogEntry | CutterLogEntry
 
 _LAST_PORT: Final = 65_535
 _MOST_DEVICES: Final = 64
@@ -129,6 +132,12 @@ def lines(knobs: Sequence[str], place: Place, seed: int) -> dict[str, Device]:
     """Make lines of SMC axes, by name; *seed* is also theirs if no knob says another; raises InvalidCommandError."""
     query = {"seed": str(seed), **query_of(knobs)}
     return {name: SimulatedPartyLine(_read(LineKnobs.from_query, query), name=name) for name in place.names("line")}
+
+
+def cutters(knobs: Sequence[str], place: Place, seed: int) -> dict[str, Device]:
+    """Make CAMM-1 cutters, by name; *seed* is also theirs if no knob says another; raises InvalidCommandError."""
+    query = {"seed": str(seed), **query_of(knobs)}
+    return {name: SimulatedCutter(_read(CutterKnobs.from_query, query), name=name) for name in place.names("cutter")}
 
 
 def query_of(knobs: Sequence[str]) -> dict[str, str]:

@@ -6,9 +6,12 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from compax_aio.errors import CompaxError, InvalidCommandError
+from compax_aio.simulator.camm1 import SimulatedCutter
 from compax_aio.simulator.compax import SimulatedDrive
 from compax_aio.simulator.far_end import FarEnd
 from compax_aio.simulator.planned_faults import FAULT_KINDS, FaultKind, duration_s, kind_named
+
+from . import panel
 
 __all__ = ["HELP", "Hands", "known_words"]
 
@@ -21,7 +24,7 @@ _SHORT_FORMS: Final[Mapping[str, str]] = {
     "release": "held off",
 }
 
-HELP: Final = """\
+HELP: Final = f"""\
 silent, held, unplug       until you say otherwise; with a time, as in `silent 5s`, for so long
 speak, release, plug       their ends; `silent off` and so on are the same
 power                      off and on again after a second; `power off`, `power on`, `power 5s`
@@ -30,6 +33,7 @@ garbled 0.01               one byte of a hundred is wrong; `lost 0.01`, `doubled
 cut                        the line is cut, and is there again at once
 fault 55, E55, estop       the drive has a fault; 55 is the emergency stop
 heal                       ends all of that; a fault of the drive is for QUIT to acknowledge
+{panel.HELP}
 where                      how every device stands
 urls                       where programs find them
 quit                       ends service, as Ctrl-C does
@@ -38,7 +42,8 @@ A name in front, as in `x2 silent`, means that device alone."""
 
 def known_words() -> tuple[str, ...]:
     """Return the words that begin a command."""
-    return (*(kind.name for kind in FAULT_KINDS), *_SHORT_FORMS, "fault", "heal", "where", "urls", "help", "quit")
+    kinds = (kind.name for kind in FAULT_KINDS)
+    return (*kinds, *_SHORT_FORMS, *panel.PANEL_WORDS, "fault", "heal", "where", "urls", "help", "quit")
 
 
 class Hands:
@@ -87,8 +92,14 @@ class Hands:
             case ["fault", code]:
                 _begin(far_ends, kind_named(f"E{code.upper().removeprefix('E')}"), [])
             case _:
-                _begin(far_ends, _kind(words[0]), words[1:])
+                _befall(far_ends, words)
         return ""
+
+
+def _befall(far_ends: Sequence[FarEnd], words: Sequence[str]) -> None:
+    """Press a key of the panel, or let a fault happen."""
+    if not panel.at_panel([each.device for each in far_ends], words):
+        _begin(far_ends, _kind(words[0]), words[1:])
 
 
 def _kind(word: str) -> FaultKind:
@@ -149,6 +160,8 @@ def _heal(far_end: FarEnd) -> None:
 
 def _where(far_end: FarEnd) -> str:
     device = far_end.device
+    if isinstance(device, SimulatedCutter):
+        return panel.how_it_stands(device)
     if isinstance(device, SimulatedDrive):
         moving = "moving" if device.moving else "standing"
         homed = "homed" if device.homed else "not homed"

@@ -9,6 +9,7 @@ from typing import Final
 from rich.text import Text
 
 from compax_aio.escaping import escaped
+from compax_aio.simulator.camm1 import LogEntry as CutterLogEntry
 
 from ..printing import Printing
 from .devices import Device, Entry
@@ -36,11 +37,24 @@ _LOOKS: Final[Mapping[str, tuple[str, str]]] = {
     "lost": _TROUBLE,
     "trouble": _TROUBLE,
     "overrun": _TROUBLE,
+    "control": _FROM_HOST,
+    "enquiry": _FROM_HOST,
+    "handshake": _TO_HOST,
+    "instruction": _MOTION,
+    "cleared": _TROUBLE,
+    "overflow": _TROUBLE,
+    "io_error": _TROUBLE,
+    "data_error": _TROUBLE,
     "refused": _TROUBLE,
     "befell": _TROUBLE,
 }
-_WORDLESS: Final = frozenset({"line", "command", "answer", "message", "trouble", "befell"})
+_WORDLESS: Final = frozenset(
+    {"line", "command", "answer", "message", "trouble", "befell", "left_out", "control", "instruction"}
+)
 """Their text alone says it all."""
+_MANY: Final = frozenset({"control", "answer", "enquiry", "handshake", "instruction"})
+"""Of a cutter: it may do hundreds in a second, and people read a few."""
+_PAUSE_S: Final = 0.25
 _CHARACTERS: Final = "received"
 """Of a line of axes: single characters, which the commands show better."""
 
@@ -70,6 +84,8 @@ class SimView:
         self._is_quiet = is_quiet
         self._began_at = began_at
         self._name_width = 0
+        self._next_at: dict[str, float] = {}
+        self._left_out: dict[str, int] = {}
 
     def watch(self, devices: Mapping[str, Device]) -> None:
         """Print what each device logs from now on."""
@@ -80,9 +96,21 @@ class SimView:
     def entry(self, name: str, entry: Entry) -> None:
         """Print what a device has logged."""
         kind = entry.kind.value
-        if not self._is_quiet and kind != _CHARACTERS:
+        if not self._is_quiet and kind != _CHARACTERS and not self._is_one_of_many(name, entry):
             axis, position = getattr(entry, "axis", ""), getattr(entry, "position", None)
             self._show(_Seen(self._time_s(entry.at), name, kind, entry.text, axis, position))
+
+    def _is_one_of_many(self, name: str, entry: Entry) -> bool:
+        """Whether to leave out what a cutter does, for people, because something was just shown; they are told."""
+        if self._printing.json or not isinstance(entry, CutterLogEntry) or entry.kind.value not in _MANY:
+            return False
+        if entry.at < self._next_at.get(name, float("-inf")):
+            self._left_out[name] = self._left_out.get(name, 0) + 1
+            return True
+        if count := self._left_out.pop(name, 0):
+            self._show(_Seen(self._time_s(entry.at), name, "left_out", f"… {count} more"))
+        self._next_at[name] = entry.at + _PAUSE_S
+        return False
 
     def befell(self, name: str, at: float, text: str) -> None:
         """Print what has befallen a device or its line."""
