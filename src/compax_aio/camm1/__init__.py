@@ -7,17 +7,76 @@ from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     from ..certainty import Certainty
+    from ..severity import Severity
+    from .checking import Checker, Problem, Sheet, check, raise_for_errors
+    from .language.instruction import Instruction, Language
+    from .language.job import Job, parse
     from .previewing.drawing import Drawing
     from .previewing.preview import preview
+    from .profiles import (
+        CX_24,
+        DXY_1300,
+        GS_24,
+        HP_7470A,
+        HP_7475A,
+        PNC_900,
+        PNC_1050,
+        PNC_1200,
+        PNC_1410,
+        PNC_1600,
+        PNC_1610,
+        PROFILES,
+        Profile,
+        profile_named,
+    )
+    from .vocabulary import JobSettings
 
-__all__ = ["Certainty", "Drawing", "preview"]
+__all__ = [
+    "CX_24",
+    "DXY_1300",
+    "GS_24",
+    "HP_7470A",
+    "HP_7475A",
+    "PNC_900",
+    "PNC_1050",
+    "PNC_1200",
+    "PNC_1410",
+    "PNC_1600",
+    "PNC_1610",
+    "PROFILES",
+    "Certainty",
+    "Checker",
+    "Drawing",
+    "Instruction",
+    "Job",
+    "JobSettings",
+    "Language",
+    "Problem",
+    "Profile",
+    "Severity",
+    "Sheet",
+    "check",
+    "parse",
+    "preview",
+    "profile_named",
+    "raise_for_errors",
+]
 
 _HOMES: Final[dict[str, tuple[str, ...]]] = {
     "..certainty": ("Certainty",),
+    "..severity": ("Severity",),
+    ".checking": ("Checker", "Problem", "Sheet", "check", "raise_for_errors"),
+    ".language.instruction": ("Instruction", "Language"),
+    ".language.job": ("Job", "parse"),
     ".previewing.drawing": ("Drawing",),
     ".previewing.preview": ("preview",),
-}
-"""Where each name is; whoever adds a module adds its names here, in __all__, and above."""
+    ".profiles": (
+        "CX_24", "DXY_1300", "GS_24", "HP_7470A", "HP_7475A", "PNC_900", "PNC_1050", "PNC_1200", "PNC_1410", "PNC_1600",
+        "PNC_1610", "PROFILES", "Profile", "profile_named",
+    ),
+    ".vocabulary": ("JobSettings",),
+}  # fmt: skip
+"""Where each name is, never in a module of that name; whoever adds a module adds its names here, in __all__, and above."""
 
 
 def __getattr__(name: str) -> Any:

@@ -146,7 +146,7 @@ class Framing:
 
     @property
     def behind_reply(self) -> bytes:
-        """What the host sends behind a reply, lest what comes next is dropped: the echo terminator (HP7470 p. 10-15)."""
+        """What the host sends behind a reply, or its next data is dropped: the echo terminator (HP7470 p. 10-15)."""
         return bytes(filter(None, (self.reply.echo_terminator,)))
 
 

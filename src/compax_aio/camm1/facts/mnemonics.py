@@ -57,6 +57,7 @@ class Mnemonic:
         name: One letter in mode 1, two in mode 2, ``!`` and two for common ones.
         counts: How many numbers it may have; None: any, and see *multiple_of* and *fewest*.
         multiple_of: Of pairs: 2.
+        ranges: Lowest and highest of the first numbers, None where none is known; what a model has is among its facts.
         draws: The machine may draw by it, if the tool is down, or whatever it was.
         moves: The tool may stand elsewhere afterwards.
         certainty: Of the arguments; the name is documented for whatever models have it.
@@ -68,6 +69,7 @@ class Mnemonic:
     counts: tuple[int, ...] | None = (0,)
     fewest: int = 0
     multiple_of: int = 1
+    ranges: tuple[tuple[float, float] | None, ...] = ()
     draws: bool = False
     moves: bool = False
     certainty: Certainty = Certainty.INFERRED
@@ -108,13 +110,13 @@ MODE_1: Final = _table(
     _one("M", "move with the tool up, absolute", None, fewest=2, multiple_of=2, moves=True),
     _one("I", "cut, relative", None, fewest=2, multiple_of=2, draws=True, moves=True),
     _one("R", "move with the tool up, relative", None, fewest=2, multiple_of=2, moves=True),
-    _one("L", "line pattern", (1,)),
+    _one("L", "line pattern", (1,), ranges=((-5, 5),)),
     _one("B", "dash pitch", (1,)),
-    _one("X", "axis with ticks", (3,), draws=True, moves=True),
+    _one("X", "axis with ticks", (3,), ranges=((0, 1), None, (1, 32_767)), draws=True, moves=True),
     _one("P", "print characters", None, shape=Shape.LINE, draws=True, moves=True),
-    _one("S", "character size", (1,)),
-    _one("Q", "rotation of text, by 90°", (1,)),
-    _one("N", "symbol", (1,), draws=True),
+    _one("S", "character size", (1,), ranges=((0, 127),)),
+    _one("Q", "rotation of text, by 90°", (1,), ranges=((0, 3),)),
+    _one("N", "symbol", (1,), ranges=((1, 15),), draws=True),
     _one("C", "arc around a point", (5, 6), draws=True, moves=True),
     _one("E", "arc from the tool position", (3, 4), draws=True, moves=True),
     _one("A", "centre for G and K", (2,)),
@@ -188,7 +190,7 @@ MODE_2: Final = _table(
     _two("SL", "slant of characters", 0, 1),
     _two("SM", "symbol at every point", shape=Shape.SIGN, counts=None),
     _two("UC", "character of one's own", counts=None, draws=True, moves=True),
-    _two("IM", "mask of errors", 0, 1, 2, 3, certainty=_PRINTED),
+    _two("IM", "mask of errors", 0, 1, 2, 3, ranges=((0, 255),), certainty=_PRINTED),
     _two("OA", "output the actual position", certainty=_PRINTED),
     _two("OC", "output the commanded position", certainty=_PRINTED),
     _two("OE", "output the error", certainty=_PRINTED),

@@ -16,10 +16,10 @@ def numbers(arguments: bytes) -> list[float]:
     Read decimal numbers with commas or blanks between them.
 
     Raises:
-        ValueError: Something else stands there; its text is what.
+        ValueError: Something else stands there, and says what.
     """
     if arguments.translate(None, _SIGNS):
-        raise ValueError(arguments.decode("latin-1").strip())
+        raise ValueError(f"{arguments.decode('latin-1').strip()!r} is no number")
     try:
         return list(map(float, arguments.split(b",")))
     except ValueError:
@@ -32,7 +32,8 @@ def _read_slowly(text: bytes) -> list[float]:
         try:
             values.append(float(each))
         except ValueError:
-            raise ValueError(each.decode("latin-1") or "nothing between two commas") from None
+            text = each.decode("latin-1")
+            raise ValueError(f"{text!r} is no number" if text else "a number is missing beside a comma") from None
     return values
 
 

@@ -75,21 +75,22 @@ class Tracker:
         """Where it is, as far as known."""
         return self.x, self.y
 
-    def follow(self, instruction: Instruction) -> Path | None:
+    def follow(self, instruction: Instruction, values: list[float] | None = None) -> Path | None:
         """
         Take an instruction; return the way that it leads, None if it leads nowhere or nobody can say where.
 
-        What cannot be read changes nothing: a check tells it.
+        What cannot be read changes nothing: a check tells it. Whoever has read its numbers gives them as *values*.
         """
         act = self._ACTS.get(instruction.language, _NO_ACTS).get(instruction.name)
         if act is None:
             key = instruction.language, instruction.name
             self.is_certain = self.is_certain and key not in _WITHOUT_NUMBERS
             return None
-        if instruction.holds_control:
-            instruction = stripped(instruction) or instruction
         try:
-            return act(self, numbers(instruction.arguments))
+            if values is None:
+                instruction = stripped(instruction) or instruction
+                values = numbers(instruction.arguments)
+            return act(self, values)
         except (ValueError, IndexError, OverflowError):
             return None
 

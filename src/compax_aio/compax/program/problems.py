@@ -4,22 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from enum import Enum
 
 from ...errors import InvalidCommandError
+from ...severity import Severity
 
 __all__ = ["Problem", "Severity", "raise_for_errors"]
-
-
-class Severity(Enum):
-    """How bad it is."""
-
-    ERROR = "error"
-    """The drive cannot be told this, or the program cannot be meant so."""
-    WARNING = "warning"
-    """Probably not meant so."""
-    NOTE = "note"
-    """All right, but read otherwise than it is written."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
