@@ -13,6 +13,7 @@ from pathlib import Path
 
 import compax_aio
 from compax_aio import Comparator, Drive
+from compax_aio.compax.vocabulary import plan_move_to
 from compax_aio.text_file import replace_file
 from compax_aio.transports.url import TransportURL
 
@@ -39,9 +40,12 @@ class Report:
         self.path = path
         self.url = url
         self.steps: list[tuple[str, Finding]] = []
+        self.doing: str | None = None
+        """The step that is under way."""
 
     def add(self, title: str, finding: Finding) -> None:
         """Note a step, print it, and write the report."""
+        self.doing = None
         self.steps.append((title, finding))
         outcome, lines = finding
         print(f"{outcome:9} {title}", *(f"          {line}" for line in lines), sep="\n", flush=True)
@@ -50,6 +54,11 @@ class Report:
         for step, (found, said) in self.steps:
             text += ["", f"## {step}: {found}", "", *(f"- {line}" for line in said)]
         replace_file(self.path, "\n".join(text) + "\n")
+
+    def end(self, outcome: str, why: str) -> None:
+        """Note how the step ended that was under way, if one was."""
+        if self.doing is not None:
+            self.add(self.doing, (outcome, [why]))
 
 
 # Steps that move nothing
@@ -83,9 +92,10 @@ async def state(drive: Drive) -> Finding:
     return "ok", ["no fault is present", *(lines or ["the error history is empty"])]
 
 
-async def limits(drive: Drive) -> Finding:
-    """Read unit and travel; from now on targets outside are refused here."""
+async def limits(drive: Drive, options: argparse.Namespace) -> Finding:
+    """Read unit and travel; from now on targets outside are refused here, and those of this run before any moves."""
     axis = await drive.read_axis()
+    check_moves(options, drive.settings)
     lines = [f"P90 = {axis.unit_code:g}, taken for {axis.unit} with {axis.decimals} decimals"]
     if axis.travel is None:
         return "look", [*lines, "P11 and P12 are the same: the drive knows no limits of the travel"]
@@ -96,6 +106,17 @@ async def parameters(drive: Drive, path: Path) -> Finding:
     """Save all parameters, before anybody changes one."""
     values = await drive.parameters.save(path)
     return "ok", [f"{len(values)} parameters are in {path}"]
+
+
+def check_moves(options: argparse.Namespace, settings: compax_aio.DriveSettings) -> None:
+    """
+    Look whether a drive can be told what is to be moved, as long as nothing moves.
+
+    Raises:
+        InvalidCommandError: It cannot.
+    """
+    comparators = [] if options.output is None else [Comparator(round(abs(options.distance) / 2, 2), options.output, 1)]
+    plan_move_to(options.distance, settings, speed_percent=options.speed, comparators=comparators)
 
 
 # Steps that move the axis
@@ -203,14 +224,26 @@ async def ask(question: str) -> None:
 
 
 async def commission(options: argparse.Namespace, report: Report) -> None:
-    """Go through all steps; a step that fails ends it, for those behind it build on it."""
+    """Go through all steps; one that fails ends it. The axis stops before that is noted: a disk may take its time."""
+    try:
+        await go_through(options, report)
+    except asyncio.CancelledError:
+        report.end("not done", "interrupted; what moved was stopped")
+        raise
+    except compax_aio.CompaxError as error:
+        report.end("failed", str(error))
+        raise
+
+
+async def go_through(options: argparse.Namespace, report: Report) -> None:
+    """Carry out step by step on an open line; leaving it stops the axis."""
     distance, speed, output = options.distance, options.speed, options.output
     async with compax_aio.connect(options.url, name="axis") as drive:
         looking: dict[str, Callable[[], Awaitable[Finding]]] = {
             "identity": lambda: identity(drive),
             "serial interface": lambda: interface(drive),
             "state": lambda: state(drive),
-            "unit and travel": lambda: limits(drive),
+            "unit and travel": lambda: limits(drive, options),
             "parameters saved": lambda: parameters(drive, options.report.with_suffix(".parameters.toml")),
         }
         moving: dict[str, Callable[[], Awaitable[Finding]]] = {
@@ -238,16 +271,9 @@ async def commission(options: argparse.Namespace, report: Report) -> None:
 
 
 async def carry_out(title: str, step: Callable[[], Awaitable[Finding]], report: Report) -> None:
-    """Do one step, and note how it went, however that is."""
-    try:
-        finding = await step()
-    except asyncio.CancelledError:
-        report.add(title, ("not done", ["interrupted; what moved is being stopped"]))
-        raise
-    except compax_aio.CompaxError as error:
-        report.add(title, ("failed", [str(error)]))
-        raise
-    report.add(title, finding)
+    """Do one step, and note what it has found."""
+    report.doing = title
+    report.add(title, await step())
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -269,6 +295,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         options.output = SIMULATED_OUTPUT if options.output is None else options.output
     if options.distance == 0:
         parser.error("--distance is not 0: a move of no length shows nothing")
+    try:
+        check_moves(options, compax_aio.DriveSettings())
+    except compax_aio.InvalidCommandError as error:
+        parser.error(str(error))
     if options.report is None:
         options.report = Path(f"commissioning-{datetime.now().astimezone():%Y%m%d-%H%M%S}.md")
     report = Report(options.report, options.url)

@@ -256,6 +256,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     if not all(named):
         parser.error("axes are written as NAME=URL, like x=serial:///dev/ttyUSB0?baudrate=9600")
     urls = {found[1] or f"axis{number}": found[2] for number, found in enumerate(named, start=1) if found}
+    if len(urls) < len(named):
+        parser.error("each axis has a name of its own")
+    if not 0 <= options.port <= 65535:
+        parser.error("--port is 0 to 65535; 0 is any that is free")
     try:
         asyncio.run(serve(create_app(urls), options.port))
     except compax_aio.CompaxError as error:

@@ -14,6 +14,7 @@ from collections.abc import Callable, Generator, Sequence
 from typing import Any
 
 import compax_aio
+from compax_aio.compax.vocabulary import plan_move_to
 
 SIMULATED = "sim://compax?machine_zero=-10"
 
@@ -198,8 +199,10 @@ def print_json(name: str, document: dict[str, Any]) -> None:
 
 
 async def run(options: argparse.Namespace, emit: Emit, pause: Pause) -> None:
-    """Connect, home, and scan."""
+    """Connect, home, and scan; a scan that leaves what the axis can do begins with nothing."""
     async with compax_aio.connect(options.url, name="axis") as drive:
+        for end in (options.start, options.stop):
+            plan_move_to(end, drive.settings)
         await drive.home()
         motor = Motor("x", drive)
         detector = Detector("counts", motor, (options.start + options.stop) / 2, options.exposure)
@@ -215,7 +218,11 @@ def run_in_bluesky(options: argparse.Namespace, emit: Emit) -> None:
 
     async def open_drive() -> compax_aio.Drive:
         drive = await compax_aio.connect(options.url, name="axis")
-        await drive.home()
+        try:
+            await drive.home()
+        except BaseException:
+            await drive.close()
+            raise
         return drive
 
     drive = in_its_loop(open_drive())
@@ -250,6 +257,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         "its first Ctrl-C ends it behind the point, its second at once",
     )
     options = parser.parse_args(argv)
+    if options.num < 1:
+        parser.error("--num is 1 or more")
+    if not 0 <= options.exposure < math.inf:
+        parser.error("--exposure is a time in seconds, 0 or more")
     emit = print_json if options.json else print_table
     try:
         if options.bluesky:

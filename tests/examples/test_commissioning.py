@@ -171,6 +171,57 @@ def test_a_move_of_no_length_is_refused(example: ModuleType, capsys: pytest.Capt
     assert "a move of no length shows nothing" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("option", "value", "says"),
+    [
+        ("--distance", "nan", "must be finite"),
+        ("--distance", "9e9", "within"),
+        ("--speed", "0", "above 0"),
+        ("--speed", "900", "at most 100"),
+        ("--output", "99", "outputs 1 to 16"),
+    ],
+)
+def test_what_no_drive_can_be_told_is_refused_before_the_line_is_opened(  # noqa: PLR0917
+    example: ModuleType,
+    simulated_drive: SimulatedAxis,
+    capsys: pytest.CaptureFixture[str],
+    option: str,
+    value: str,
+    says: str,
+) -> None:
+    with pytest.raises(SystemExit):
+        example.main([simulated_drive.url, "--yes", option, value])
+    assert says in capsys.readouterr().err
+    assert simulated_drive.lines == []
+
+
+def test_a_distance_outside_of_the_travel_ends_it_before_anything_moves(
+    example: ModuleType, simulated_group: SimulatedGroup, virtual_time: VirtualTime
+) -> None:
+    axis = simulated_group.add("short", travel_min=-5.0, travel_max=5.0)
+    assert example.main([axis.url, "--yes", "--report", "report.md"]) == 1
+    assert outcomes()["unit and travel"] == "failed"
+    axis.assert_never_moved()
+
+
+def test_the_axis_is_stopped_before_the_disk_is_asked_for_anything(
+    example: ModuleType, simulated_drive: SimulatedAxis, faults: Faults, virtual_time: VirtualTime
+) -> None:
+    written = example.replace_file
+    moving = []
+
+    def looking(*arguments: Any) -> None:
+        moving.append(simulated_drive.moving)
+        written(*arguments)
+
+    vars(example)["replace_file"] = looking
+    faults.at(2.0).silent(for_s=1.5)
+    options = ["--yes", "--distance", "500", "--speed", "5", "--report", "report.md"]
+    assert example.main([simulated_drive.url, *options]) == 1
+    assert outcomes()["small moves"] == "failed"
+    assert not any(moving)
+
+
 def test_a_report_has_a_name_of_its_own_and_no_password_in_it(
     example: ModuleType, virtual_time: VirtualTime, capsys: pytest.CaptureFixture[str]
 ) -> None:

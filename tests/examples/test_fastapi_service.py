@@ -263,6 +263,18 @@ def test_an_axis_is_written_as_name_and_url(capsys: pytest.CaptureFixture[str]) 
     assert "axes are written as NAME=URL" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [(["x=sim://compax", "x=sim://smc"], "a name of its own"), (["--port", "99999"], "0 to 65535")],
+)
+def test_words_that_cannot_be_meant_are_refused(
+    capsys: pytest.CaptureFixture[str], words: list[str], says: str
+) -> None:
+    with pytest.raises(SystemExit):
+        load().main(words)
+    assert says in capsys.readouterr().err
+
+
 def test_a_port_that_is_taken_is_told(capsys: pytest.CaptureFixture[str]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import importlib.util
 import json
 import signal
@@ -184,6 +185,30 @@ def test_ctrl_c_stops_the_axis(
     assert told.err == "interrupted; the axis was stopped\n"
     assert told.out.splitlines()[-1].startswith("abort: 1 points")
     simulated_drive.assert_stopped()
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "says"),
+    [
+        ("--stop", "nan", "must be finite"),
+        ("--stop", "9e9", "must be within"),
+        ("--num", "0", "1 or more"),
+        ("--exposure", "nan", "0 or more"),
+    ],
+)
+def test_a_scan_that_cannot_be_does_not_even_home(  # noqa: PLR0917
+    example: ModuleType,
+    simulated_drive: SimulatedAxis,
+    virtual_time: VirtualTime,
+    capsys: pytest.CaptureFixture[str],
+    option: str,
+    value: str,
+    says: str,
+) -> None:
+    with contextlib.suppress(SystemExit):
+        assert example.main([simulated_drive.url, option, value]) == 1
+    assert says in capsys.readouterr().err
+    simulated_drive.assert_never_moved()
 
 
 def test_without_bluesky_it_says_so(example: ModuleType, capsys: pytest.CaptureFixture[str]) -> None:
