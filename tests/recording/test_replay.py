@@ -1,5 +1,6 @@
 """``replay://``: a recorded conversation plays the drive's side; so a field problem is a test case."""
 
+# ruff: noqa: ASYNC240 - files of tests are small, and nothing else runs meanwhile
 from __future__ import annotations
 
 import asyncio
@@ -559,7 +560,7 @@ async def test_a_url_that_names_no_conversation_is_refused(path: Path, options: 
 async def test_a_file_that_is_no_trace_or_not_there_is_refused(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(TransportError, match=r"could not be opened: .*No such file"):
         await open_transport(replayed(path), Witness)
-    path.write_text("a,b\n")  # noqa: ASYNC240
+    path.write_text("a,b\n")
     with pytest.raises(TransportError, match=r"cannot be replayed: .* is no trace"):
         await open_transport(replayed(path), Witness)
     with pytest.raises(TransportError, match="names no trace"):
@@ -582,3 +583,75 @@ async def test_a_path_may_be_relative(path: Path, monkeypatch: pytest.MonkeyPatc
     transport = await open_transport("replay://trace.jsonl", Witness)
     transport.abort()
     await asyncio.sleep(0)
+
+
+# What is not invented -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("speed", [0, 1, 1e6])
+async def test_what_came_in_one_moment_comes_in_the_same_order(path: Path, speed: float) -> None:
+    write(
+        path,
+        [
+            (0.0, "x", LineMade()),
+            (0.0, "x", Opening("u")),
+            (0.0, "x", Opened()),
+            (0.1, "x", Sent(b"S1\r", 1)),
+            *((0.2, "x", Received(bytes([each]))) for each in b"S001:       0.00\r\n>"),
+        ],
+    )
+    witness = Witness()
+    transport = await open_transport(replayed(path, mode="lenient", speed=speed), lambda: witness)
+    transport.write(b"S1\r")
+    await asyncio.sleep(1)
+    assert bytes(witness.data) == b"S001:       0.00\r\n>"
+    transport.close()
+
+
+async def test_a_message_that_came_before_an_answer_does_not_come_with_it_again(path: Path) -> None:
+    clean = [Sent(b"S1\r", 1), Received(b"S001: 1\r\n>"), Noticed("Answered", ends_turn=True)]
+    mixed = [
+        Sent(b"S1\r", 2), Received(b"$\r\n>"), Noticed("PositionReached"),
+        Received(b"S001: 2\r\n>"), Noticed("Answered", ends_turn=True),
+    ]  # fmt: skip
+    asked = [Asked(1, "S1", Lane.READ), Asked(2, "S1", Lane.READ)]
+    steps = [LineMade(), Opening("u"), Opened(), *asked, *clean, *mixed]
+    write(path, [(0.0, "x", step) for step in steps])
+    witness = Witness()
+    transport = await open_transport(replayed(path, mode="lenient", speed=0), lambda: witness)
+    for _ in range(4):
+        transport.write(b"S1\r")
+        await asyncio.sleep(1)
+    assert bytes(witness.data) == b"S001: 1\r\n>$\r\n>S001: 2\r\n>S001: 1\r\n>S001: 1\r\n>"
+    transport.close()
+
+
+async def test_a_program_that_was_killed_leaves_a_trace_that_is_played_as_far_as_it_goes(path: Path) -> None:
+    await record_move(path)
+    data = path.read_bytes()
+    end = data.index(b'"what":"closed"')
+    for cut in (end + 5, end - 40, end - 200):
+        path.write_bytes(data[:cut])
+        async with compax_aio.connect(replayed(path, speed=0), name="x") as drive:
+            assert (await drive.move_to(12.5)).target == 12.5
+    path.write_bytes(data[:-5] + b"\n" + data)
+    async with compax_aio.connect(replayed(path, speed=0, session=1), name="x") as drive:
+        assert (await drive.move_to(12.5)).target == 12.5
+
+
+async def test_what_is_behind_a_gap_is_not_played(path: Path) -> None:
+    write(
+        path,
+        [
+            (0.0, "x", LineMade()),
+            (0.0, "x", Opening("u")),
+            (0.0, "x", Opened()),
+            (0.1, "x", Missing(3)),
+            (0.2, "x", Noticed("Stray")),
+        ],
+    )
+    (await open_transport(replayed(path), Witness)).close()
+    with path.open("a") as file:
+        file.write('{"at":0.3,"line":"x","what":"received","data":"1"}\n')
+    with pytest.raises(TransportError, match="has a gap in line 5"):
+        await open_transport(replayed(path), Witness)

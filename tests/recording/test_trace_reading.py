@@ -80,7 +80,7 @@ def path(tmp_path: Path) -> Path:
 # Entries --------------------------------------------------------------------------------------------------------------
 
 
-@given(at=st.floats(-1e6, 1e6), line=texts, fact=some_facts)
+@given(at=st.floats(0, 1e6), line=texts, fact=some_facts)
 @settings(max_examples=300)
 def test_every_fact_is_read_as_it_was_written(at: float, line: str, fact: Fact) -> None:
     (text,) = encoded(at, line, fact)
@@ -110,7 +110,7 @@ def test_numbers_that_json_has_not_are_written_as_text() -> None:
         ('{"at":0,"what":["sent"]}', "nothing is called"),
         ('{"what":"opened"}', "its time cannot be None"),
         ('{"at":true,"what":"opened"}', "its time cannot be True"),
-        ('{"at":NaN,"what":"opened"}', "its time cannot be nan"),
+        ('{"at":NaN,"what":"opened"}', "NaN is no number"),
         ('{"at":1e400,"what":"opened"}', "its time cannot be inf"),
         ('{"at":1' + "0" * 400 + ',"what":"opened"}', "its time cannot be"),
         ('{"at":0,"line":7,"what":"opened"}', "the name of a line"),
@@ -295,3 +295,29 @@ def test_any_file_is_read_or_refused_on_one_line(path: Path, entries: list[dict[
     said = refusal(lambda: list(read_trace(path))) or ""
     assert said.isprintable()
     assert len(said) < 1000
+
+
+# Not cut, but wrong ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("line", "why"),
+    [
+        ('{"at":0.0,"what":"session","begun":"a","by":"b","format":"compax-aio trace","version":2}', "of version 2"),
+        ('{"at":0.0,"what":"dance"}', "nothing is called 'dance'"),
+        ('{"at":0.0,"what":"opened","at":1.0}', "stands in it twice"),
+        ('{"at":0.0,"what":"noticed","event":"x","details":{"a":1,"a":2}}', "stands in it twice"),
+        ('{"at":-0.001,"what":"opened"}', "its time cannot be"),
+        ('{"at":0.0,"what":"missing","entries":-1}', "entries must be a whole number up to"),
+        ('{"at":0.0,"what":"missing","entries":' + "9" * 4000 + "}", "entries must be a whole number up to"),
+    ],
+)
+@pytest.mark.parametrize("where", ["alone", "at the end", "before a session"])
+def test_what_is_whole_and_no_entry_is_not_taken_for_a_line_that_was_cut(
+    path: Path, line: str, why: str, where: str
+) -> None:
+    (session,) = encoded(0.0, "", SessionBegun("now", "test"))
+    lines = {"alone": [line], "at the end": [session, line], "before a session": [session, line, session]}
+    path.write_text("".join(f"{each}\n" for each in lines[where]))
+    with pytest.raises(InvalidCommandError, match=why):
+        list(read_trace(path))

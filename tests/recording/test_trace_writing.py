@@ -296,6 +296,7 @@ class Disk:
     def _write(self, write: Callable[[], None], file: TraceFile) -> None:
         assert self.may_go.wait(20)
         if self.is_full:
+            file.taken = 0
             file.close()
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         write()

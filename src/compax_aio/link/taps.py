@@ -174,8 +174,11 @@ class Noticed(Fact):
         return cls(type(event).__name__, ends_turn, details or None)
 
 
-LineTap = Callable[[Fact], None]
-"""Is told what happens on one line, in order; it stands in the way of the line, and must not raise, wait or dawdle."""
+LineTap = Callable[[Fact], bool | None]
+"""
+Is told what happens on one line, in order, until it says False: it has heard enough. It stands in the way of the line,
+and must not raise, wait or dawdle.
+"""
 
 Tap = Callable[[str, Mapping[str, object]], LineTap]
 """Is told the name of a line that is made, and what is known about its device."""

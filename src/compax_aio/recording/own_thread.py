@@ -7,6 +7,7 @@ from concurrent.futures import Executor, Future
 from queue import SimpleQueue
 from threading import Thread
 from typing import ParamSpec, TypeVar
+from weakref import finalize
 
 __all__ = ["OwnThread"]
 
@@ -16,7 +17,7 @@ _P = ParamSpec("_P")
 
 class OwnThread(Executor):
     """
-    An executor of one daemon thread, which does one thing after the other.
+    An executor of one daemon thread, which does one thing after the other; it ends with the executor, if not before.
 
     Args:
         name: Of the thread.
@@ -24,7 +25,9 @@ class OwnThread(Executor):
 
     def __init__(self, name: str) -> None:
         self._jobs: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
-        Thread(target=self._work, name=name, daemon=True).start()
+        # The thread knows its jobs and not the executor: one that everybody has forgotten holds no thread.
+        Thread(target=_work, args=(self._jobs,), name=name, daemon=True).start()
+        finalize(self, self._jobs.put, None)
 
     def submit(self, fn: Callable[_P, _T], /, *args: _P.args, **kwargs: _P.kwargs) -> Future[_T]:
         """Let the thread call *fn*, when it has done all that came before."""
@@ -45,6 +48,8 @@ class OwnThread(Executor):
         """Let the thread end when it has done what it was told; nobody waits for that."""
         self._jobs.put(None)
 
-    def _work(self) -> None:
-        while (job := self._jobs.get()) is not None:
-            job()
+
+def _work(jobs: SimpleQueue[Callable[[], None] | None]) -> None:
+    while (job := jobs.get()) is not None:
+        job()
+        del job  # or it would be held, with all that it knows, until the next one comes

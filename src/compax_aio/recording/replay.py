@@ -97,7 +97,7 @@ async def open_replay(url: TransportURL, protocol_factory: ProtocolFactory) -> a
         UnexpectedAnswerError: The line was lost because something else was sent than then.
     """
     url.expect(_FORM, host=True, path=True, query=_OPTIONS)
-    owner = getattr(protocol_factory, "__self__", protocol_factory)
+    owner = getattr(protocol_factory, "__self__", None)  # a class or a function is anybody's, and outlives them
     known = _known(owner)
     if known is None or known[0] != url.text:
         known = (url.text, await _read(url))

@@ -7,7 +7,9 @@ import logging
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from itertools import chain
+from functools import partial
+from heapq import heappop, heappush
+from itertools import chain, count
 from typing import Final, cast
 
 from ..errors import ConnectionLostError
@@ -34,27 +36,40 @@ class _FarEnd(asyncio.Protocol):
         self._speed = speed
         self._loop = asyncio.get_running_loop()
         self._transport: LoopbackTransport | None = None
-        self._timers: set[asyncio.TimerHandle] = set()
+        self._timer: asyncio.TimerHandle | None = None
+        self._due: list[tuple[float, int, Callable[[], None]]] = []
+        """A heap of what comes when; of what comes at one time, what was said first."""
+        self._said = count()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport = cast("LoopbackTransport", transport)
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002
         self._transport = None
-        for timer in self._timers:
-            timer.cancel()
-        self._timers.clear()
+        self._due.clear()
+        self._set_timer()
 
     def _scaled(self, seconds: float) -> float:
         return max(seconds, 0.0) / self._speed if self._speed else 0.0
 
     def _at(self, when: float, do: Callable[[], None]) -> None:
-        def run() -> None:
-            self._timers.discard(timer)
-            do()
+        # One timer for all: those of an event loop come in any order when they are for the same time.
+        heappush(self._due, (when, next(self._said), do))
+        self._set_timer()
 
-        timer = self._loop.call_at(when, run)
-        self._timers.add(timer)
+    def _set_timer(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer = self._loop.call_at(self._due[0][0], self._do_what_is_due) if self._due else None
+
+    def _do_what_is_due(self) -> None:
+        now = max(self._loop.time(), self._due[0][0])
+        due = []
+        while self._due and self._due[0][0] <= now:
+            due.append(heappop(self._due)[2])
+        for do in due:
+            do()
+        self._set_timer()
 
     def _play(self, entry: TraceEntry) -> None:
         if self._transport is None:
@@ -169,6 +184,8 @@ class _Spoken:
     answers: list[TraceEntry] = field(default_factory=list)
     later: list[TraceEntry] = field(default_factory=list)
     """What came unasked, until the next line that told something."""
+    is_pure: bool = True
+    """Nothing unasked came before the answer was over, so that it is as true when it comes again."""
 
 
 class Answers:
@@ -192,7 +209,9 @@ class Answers:
         """Return what comes of a line, and whether that is for the first time."""
         waiting = self._spoken.get(key)
         if waiting:
-            spoken = self._last[key] = waiting.popleft()
+            spoken = waiting.popleft()
+            if spoken.is_pure:
+                self._last[key] = spoken
             return spoken, True
         is_whole = key.endswith(_ENDS_A_LINE) or key[:1] >= b"\x80"
         return (self._last.get(key), False) if self._asks(key) or not is_whole else (None, False)
@@ -214,6 +233,8 @@ class Answers:
                             teller = current
                 case Noticed(ends_turn=True):
                     current = None
+                case Noticed() if current is not None:
+                    current.is_pure = False
                 case Received() if current is not None:
                     current.answers.append(step)
                 case Received() | Lost():
@@ -299,4 +320,4 @@ class LenientFarEnd(_FarEnd):
     def _say(self, spoken: _Spoken, *, is_first: bool) -> None:
         now = self._loop.time()
         for step in chain(spoken.answers, spoken.later if is_first else ()):
-            self._at(now + self._scaled(step.at - spoken.at), lambda step=step: self._play(step))  # type: ignore[misc]
+            self._at(now + self._scaled(step.at - spoken.at), partial(self._play, step))

@@ -18,6 +18,7 @@ __all__ = ["Attempt", "Script", "read_script"]
 
 _MOST_STEPS: Final = 300_000
 """Of a conversation that is played; in memory they take some hundred megabytes."""
+_PLAYED: Final = (Opening, Opened, Refused, Sent, Received, Lost)
 
 
 @dataclass(slots=True, eq=False)
@@ -90,15 +91,18 @@ def _script(path: Path, conversation: Conversation) -> Script:
             f"{len(conversation.entries)} entries, of {_MOST_STEPS} that may be",
             hint="cut the file behind what matters; a trace may be cut at any byte",
         )
+    gap: TraceEntry | None = None
     for entry in conversation.entries:
+        if gap is not None and isinstance(entry.fact, _PLAYED):
+            raise InvalidCommandError(
+                f"{name_of(path)} has a gap in {gap.where}: what is behind it cannot be played",
+                hint="cut the file there",
+            )
         if isinstance(entry.fact, Opening):
             attempts.append(Attempt(entry))
             was_let_go = False
         elif attempts and isinstance(entry.fact, Missing | Cut):
-            raise InvalidCommandError(
-                f"{name_of(path)} has a gap in {entry.where}: what is behind it cannot be played",
-                hint="cut the file there",
-            )
+            gap = gap or entry
         elif attempts and not was_let_go:
             was_let_go = _took_end(attempts[-1], entry)
     if not attempts:

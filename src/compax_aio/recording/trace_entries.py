@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING, dataclass, fields, replace
+from itertools import islice
 from math import isfinite
 from typing import Any, Final
 
@@ -41,6 +42,7 @@ __all__ = [
     "TraceEntry",
     "decoded",
     "encoded",
+    "may_be_cut",
 ]
 
 FORMAT: Final = "compax-aio trace"
@@ -50,6 +52,8 @@ LONGEST_LINE: Final = 256 * 1024
 """Characters of a line that is read. One that is written has a tenth of it, but for long listings."""
 _BYTES_AN_ENTRY: Final = 1024
 _LATEST_S: Final = 1e9
+_MOST: Final = 10**15
+_NAMES_SHOWN: Final = 5
 _LONGEST_TEXT: Final = 20_000
 """Characters of a text; an escaped one has six times as many."""
 
@@ -148,7 +152,7 @@ _NAMES: Final = {kind: name for name, kind in _KINDS.items()}
 
 
 def encoded(at: float, line: str, fact: Fact) -> Iterator[str]:
-    """Write what happened as lines of JSON, without their ends; usually one, of many bytes more."""
+    """Write what happened as lines of JSON, without their ends; usually one, of many bytes more, none too long."""
     for part in _parts(fact):
         entry: dict[str, Any] = {"at": round(at, 6)}
         if line:
@@ -160,7 +164,10 @@ def encoded(at: float, line: str, fact: Fact) -> Iterator[str]:
                 entry[field.name] = _written(value)
         if isinstance(part, SessionBegun):
             entry |= {"format": FORMAT, "version": VERSION}
-        yield json.dumps(entry, separators=(",", ":"), allow_nan=False)
+        text = json.dumps(entry, separators=(",", ":"), allow_nan=False)
+        if len(text) > LONGEST_LINE:  # nobody would read it, nor what is behind it
+            text = json.dumps({"at": round(at, 6), "what": _NAMES[Missing], "entries": 1}, separators=(",", ":"))
+        yield text
 
 
 def _parts(fact: Fact) -> Iterator[Fact]:
@@ -189,6 +196,15 @@ def _written(value: Any) -> Any:
 # Reading ------------------------------------------------------------------------------------------------------------
 
 
+def may_be_cut(text: str) -> bool:
+    """Whether *text*, which is no entry, can be the beginning of one: what is whole JSON was not cut."""
+    try:
+        json.loads(text)
+    except (ValueError, RecursionError):
+        return True
+    return False
+
+
 def decoded(text: str) -> TraceEntry:
     """
     Read one line of a trace.
@@ -199,7 +215,7 @@ def decoded(text: str) -> TraceEntry:
     if not text.isascii():
         raise InvalidCommandError("it holds a character that is not ASCII")
     try:
-        entry = json.loads(text)
+        entry = json.loads(text, object_pairs_hook=_each_once, parse_constant=_no_number)
     except (ValueError, RecursionError) as error:
         raise InvalidCommandError(f"it is no JSON: {error}") from None
     if not isinstance(entry, dict):
@@ -208,13 +224,24 @@ def decoded(text: str) -> TraceEntry:
     kind = _KINDS.get(what) if isinstance(what, str) else None
     if kind is None:
         raise InvalidCommandError(f"nothing is called {shown(what)} in a trace")
-    if isinstance(at, bool) or not isinstance(at, int | float) or not abs(at) < _LATEST_S:
+    if isinstance(at, bool) or not isinstance(at, int | float) or not 0 <= at < _LATEST_S:
         raise InvalidCommandError(f"its time cannot be {shown(at)}")
     if not isinstance(line, str):
         raise InvalidCommandError(f"the name of a line cannot be {shown(line)}")
     if kind is SessionBegun:
         _expect_known_form(entry)
     return TraceEntry(float(at), line, _fact(kind, entry))
+
+
+def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    told = dict(pairs)
+    if len(told) < len(pairs):
+        raise ValueError("a name stands in it twice")
+    return told
+
+
+def _no_number(text: str) -> None:
+    raise ValueError(f"{text} is no number")
 
 
 def _expect_known_form(entry: Mapping[str, Any]) -> None:
@@ -239,7 +266,7 @@ def _fact(kind: type[Fact], entry: dict[str, Any]) -> Fact:
         elif field.default is MISSING:
             raise InvalidCommandError(f"it says nothing of {field.name}")
     if entry:
-        raise InvalidCommandError(f"it has no place for {', '.join(sorted(map(shown, entry)))}")
+        raise InvalidCommandError(f"it has no place for {', '.join(sorted(map(shown, islice(entry, _NAMES_SHOWN))))}")
     return kind(**given)
 
 
@@ -252,12 +279,18 @@ def _exactly(kind: type) -> Callable[[Any], Any]:
     return read
 
 
+def _count(value: Any) -> int:
+    if type(value) is not int or not 0 <= value <= _MOST:
+        raise ValueError
+    return value
+
+
 _text = _exactly(str)
 _READERS: Final[Mapping[str, tuple[Callable[[Any], Any], str]]] = {
     "str": (_text, "a text"),
     "str | None": (_text, "a text"),
-    "int": (_exactly(int), "a whole number"),
-    "int | None": (_exactly(int), "a whole number"),
+    "int": (_count, f"a whole number up to {_MOST}"),
+    "int | None": (_count, f"a whole number up to {_MOST}"),
     "bool": (_exactly(bool), "true or false"),
     "bytes": (lambda value: _text(value).encode("latin-1"), "bytes, written as the characters of the same codes"),
     "Lane": (lambda value: Lane[_text(value).upper()], f"one of {', '.join(lane.name.lower() for lane in Lane)}"),

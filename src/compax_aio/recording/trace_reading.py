@@ -18,6 +18,7 @@ from .trace_entries import (
     SessionEnded,
     TraceEntry,
     decoded,
+    may_be_cut,
 )
 from .trace_file import older_file
 
@@ -57,11 +58,14 @@ def read_trace(path: str | Path) -> Iterator[TraceEntry]:
         OSError: It cannot be read.
     """
     path = Path(path)
-    first = next(_entries(path), None)
-    is_continued = first is not None and isinstance(first.fact, SessionBegun) and first.fact.part > 1
-    files = [path]
-    if is_continued and older_file(path).exists():
-        files.insert(0, older_file(path))
+    older = older_file(path)
+    if path.exists() or not older.exists():
+        first = next(_entries(path), None)
+        # Or the program stopped in the moment in which the new file was begun.
+        is_continued = first is None or isinstance(first.fact, Cut) or getattr(first.fact, "part", 1) > 1
+        files = [older, path] if is_continued and older.exists() else [path]
+    else:
+        files = [older]
     session, begun = 0, ""
     for file in files:
         for entry in _entries(file):
@@ -81,6 +85,8 @@ def _entries(path: Path) -> Iterator[TraceEntry]:
             except InvalidCommandError as error:
                 if cut is not None:
                     raise _damaged(path, *cut) from None
+                if not may_be_cut(text):
+                    raise _damaged(path, TraceEntry(0.0, "", Cut(""), place=place), error) from None
                 cut = TraceEntry(0.0, "", Cut(text[:_LONGEST_CUT]), place=place), error
                 continue
             if cut is not None:
@@ -93,7 +99,7 @@ def _entries(path: Path) -> Iterator[TraceEntry]:
             is_first = False
             yield entry
         if cut is not None:
-            if is_first and not _may_be_cut(cut[0]):
+            if is_first and not _may_begin(cut[0]):
                 raise _damaged(path, *cut)
             yield cut[0]
 
@@ -109,7 +115,7 @@ def _lines(file: Any, path: Path) -> Iterator[tuple[int, str]]:
         yield place, line.removesuffix(b"\n").decode("latin-1")
 
 
-def _may_be_cut(entry: TraceEntry) -> bool:
+def _may_begin(entry: TraceEntry) -> bool:
     return isinstance(entry.fact, Cut) and '{"at":0.0,"what":"session"'.startswith(entry.fact.text[:26])
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import logging
 from collections import deque
 from collections.abc import AsyncIterator, Mapping
@@ -14,7 +15,7 @@ from typing import Any, Final
 
 from ..errors import InvalidCommandError
 from ..link.cancellation import despite_cancellation
-from ..link.taps import TAPS, Fact, LineTap, Noticed, Received, Sent
+from ..link.taps import TAPS, Ended, Fact, LineTap, Noticed, Received, Sent
 from ..text_file import name_of
 from .own_thread import OwnThread
 from .trace_entries import LineMade, Missing, SessionBegun, SessionEnded
@@ -31,6 +32,7 @@ _MANY: Final = 2_000
 """So many entries are written at once."""
 _MOST_WAITING: Final = 20_000
 _MOST_BYTES_WAITING: Final = 4 * 1024 * 1024
+_OPENING_S: Final = 10.0
 _ENDING_S: Final = 5.0
 
 _log = logging.getLogger("compax_aio.recording")
@@ -68,22 +70,37 @@ class TraceRecorder:
     async def open(self) -> None:
         """Open the file; see :meth:`TraceFile.open` for errors."""
         try:
-            await self._loop.run_in_executor(self._thread, self._file.open)
+            async with asyncio.timeout(_OPENING_S):
+                await self._loop.run_in_executor(self._thread, self._file.open)
+        except TimeoutError:
+            self._close_file()
+            raise TimeoutError(
+                errno.ETIMEDOUT, f"the disk has not opened it within {_OPENING_S:g} s", str(self.path)
+            ) from None
         except BaseException:
-            self._thread.submit(self._file.close)
-            self._thread.shutdown()
+            self._close_file()
             raise
 
     def line(self, name: str, about: Mapping[str, object]) -> LineTap:
         """Listen to a line that is made; see :data:`~compax_aio.link.taps.Tap`."""
         if asyncio.get_running_loop() is not self._loop:
             _log.warning("%s is not recorded: it is in another event loop than its recording", name)
-            return lambda _: None
-        self._names[name] = count = self._names.get(name, 0) + 1
-        called = name if count == 1 else f"{name} ({count})"
+            return lambda _: False
+        if self._is_over:
+            return lambda _: False
+        called = self._name_of_its_own(name)
         more: dict[str, Any] = dict(about)
         self._take(called, LineMade(str(more.pop("device", "")), about=more or None))
         return partial(self._take, called)
+
+    def _name_of_its_own(self, name: str) -> str:
+        """Return *name*, or ``name (2)`` and so on, whichever no other line has had."""
+        called = name = name or "unnamed"
+        while called in self._names:
+            self._names[name] = count = self._names[name] + 1
+            called = f"{name} ({count})"
+        self._names[called] = 1
+        return called
 
     async def close(self) -> None:
         """Write what waits, within a few seconds; a disk that takes longer than that is not waited for."""
@@ -107,32 +124,39 @@ class TraceRecorder:
                 while self._writing is not None:
                     await asyncio.wait([self._writing])
                     self._hand_over()
-        self.missing += len(self._waiting)
-        self._thread.submit(self._file.close)
+                await asyncio.wait([self._close_file()])  # so that whoever records to it next finds it free
+                return
+        self.missing += sum(not isinstance(fact, Missing) for _, _, fact in self._waiting)
+        self._close_file()
+
+    def _close_file(self) -> asyncio.Future[None]:
+        """Let the thread close the file when it has done all else, and end."""
+        closed = self._loop.run_in_executor(self._thread, self._file.close)
         self._thread.shutdown()
+        return closed
 
     # Of the event loop ------------------------------------------------------------------------------------------------
 
-    def _take(self, line: str, fact: Fact) -> None:
+    def _take(self, line: str, fact: Fact) -> bool:
+        """Note *fact*; False if no more is wanted."""
         if self._is_over:
-            return
+            return False
         at = self._loop.time() - self._begun_at
         size = _size(fact)
         if len(self._waiting) >= _MOST_WAITING or self._bytes_waiting + size > _MOST_BYTES_WAITING:
             self.missing += 1
             self._missing_here += 1
-            return
+            return True
         if self._missing_here:
             self._waiting.append((at, "", Missing(self._missing_here)))
             self._missing_here = 0
         self._waiting.append((at, line, fact))
         self._bytes_waiting += size
-        if self._writing is not None:
-            return
-        if len(self._waiting) >= _MANY:
+        if self._writing is None and len(self._waiting) >= _MANY:
             self._hand_over()
-        elif self._timer is None:
+        elif self._writing is None and self._timer is None:
             self._timer = self._loop.call_later(_GATHERED_S, self._hand_over)
+        return True
 
     def _hand_over(self) -> None:
         """Let the thread write what waits, unless it is at it."""
@@ -159,19 +183,22 @@ class TraceRecorder:
             self._timer = self._loop.call_later(0 if is_full else _GATHERED_S, self._hand_over)
 
     def _failed(self, entries: deque[tuple[float, str, Fact]], error: BaseException) -> None:
-        lost = sum(fact.entries if isinstance(fact, Missing) else 1 for _, _, fact in entries)
-        self.missing += sum(not isinstance(fact, Missing) for _, _, fact in entries)
+        left = list(entries)[self._file.taken :]
+        lost = sum(fact.entries if isinstance(fact, Missing) else 1 for _, _, fact in left)
+        self.missing += sum(not isinstance(fact, Missing) for _, _, fact in left)
         if self.error is None:
             _log.error("%s: the trace cannot be written: %s; it is tried on", name_of(self.path), error)
         self.error = error if isinstance(error, OSError) else OSError(str(error))
-        if not self._is_over:
-            self._waiting.appendleft((entries[0][0], "", Missing(lost)))
+        if left and not self._is_over:
+            self._waiting.appendleft((left[0][0], "", Missing(lost)))
 
 
 def _size(fact: Fact) -> int:
     """Return about how many bytes of memory it takes."""
     if isinstance(fact, Sent | Received):
         return len(fact.data) + 100
+    if isinstance(fact, Ended):
+        return len(fact.text or "") + 300
     return len(str(fact.details)) + 200 if isinstance(fact, Noticed) else 300
 
 
@@ -203,10 +230,11 @@ async def record_trace(path: str | Path, *, max_bytes: int = DEFAULT_MAX_BYTES) 
         raise InvalidCommandError(f"max_bytes is a whole number from {SMALLEST_TRACE} on, not {max_bytes!r}")
     recorder = TraceRecorder(TraceFile(Path(path), max_bytes, await asyncio.to_thread(_session)))
     await recorder.open()
-    token = TAPS.set((*TAPS.get(), recorder.line))
+    tap = recorder.line
+    TAPS.set((*TAPS.get(), tap))
     try:
         yield recorder
     finally:
-        with suppress(ValueError):  # the block is left in another context than it was entered in
-            TAPS.reset(token)
+        # No token: blocks may be left in another order, or another context, than they were entered in.
+        TAPS.set(tuple(each for each in TAPS.get() if each is not tap))
         await recorder.close()
