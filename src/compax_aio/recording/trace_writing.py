@@ -189,7 +189,7 @@ class TraceRecorder:
         if self.error is None:
             _log.error("%s: the trace cannot be written: %s; it is tried on", name_of(self.path), error)
         self.error = error if isinstance(error, OSError) else OSError(str(error))
-        if left and not self._is_over:
+        if left and (self._waiting or not self._is_over):  # at the end, only if something is tried after it
             self._waiting.appendleft((left[0][0], "", Missing(lost)))
 
 
