@@ -6,11 +6,13 @@ import json
 import signal
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from tests.fakes.commands import Commands
 
 from compax_aio import DriveSettings
+from compax_aio.cli.printing import Printing
 from compax_aio.simulator.compax import Knobs, LogKind, SimulatedDrive
 
 X = "sim://compax?name=x"
@@ -67,7 +69,7 @@ def test_the_document_has_all_of_the_result(compax: Commands, x: SimulatedDrive)
     ("words", "says"),
     [
         (("1e9",), "within ±4,000,000"),
-        (("nan",), "finite"),
+        (("nan",), "no number"),
         (("10", "--speed", "0"), "speed_percent"),
         (("10", "--acceleration-ms", "65001"), "65"),
         (("10", "--timeout", "0"), "timeout_s must be above 0"),
@@ -127,6 +129,17 @@ def test_a_detached_move_that_is_refused_is_told(compax: Commands) -> None:
 # Signals
 
 
+def interrupted_when_shown(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let Ctrl-C come while the result is printed."""
+    show = Printing.show
+
+    def show_and_interrupt(printing: Printing, *told: Any) -> None:
+        show(printing, *told)
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(Printing, "show", show_and_interrupt)
+
+
 @pytest.mark.parametrize(
     ("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)], ids=str
 )
@@ -162,6 +175,42 @@ def test_a_signal_before_the_drive_has_accepted_stops_a_detached_move_too(compax
     outcome = compax("move", X, "1000", "--detach", "--name", "x")
     assert outcome.code == 130
     assert not x.moving
+
+
+def test_a_signal_after_a_detached_move_was_accepted_says_that_it_goes_on(
+    compax: Commands, x: SimulatedDrive, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    interrupted_when_shown(monkeypatch)
+    outcome = compax("move", X, "1000", "--detach", "--name", "x")
+    assert outcome.code == 130
+    assert "Interrupted. x has accepted PA1000$; it goes on, and nobody watches it." in outcome.told
+    assert "was stopped" not in outcome.told
+    assert x.moving
+
+
+def test_a_signal_after_the_target_was_reached_does_not_say_that_it_was_stopped(
+    compax: Commands, x: SimulatedDrive
+) -> None:
+    def interrupt_while_the_position_is_read() -> None:
+        if x.log.texts(LogKind.MOTION_REACHED):
+            x.extra_answer_delay_s = 0.5
+            compax.loop.call_later(0.3, signal.raise_signal, signal.SIGINT)
+        else:
+            compax.loop.call_later(0.001, interrupt_while_the_position_is_read)
+
+    compax.after(0.0, interrupt_while_the_position_is_read)
+    outcome = compax("move", X, "10", "--name", "x")
+    assert outcome.code == 130
+    assert outcome.told.endswith("Interrupted. x had reached 10.00 units before.")
+    assert "STOP" not in x.log.texts(LogKind.LINE)
+
+
+def test_a_signal_before_anything_was_sent_says_nothing_of_an_axis_that_stands(compax: Commands) -> None:
+    compax.drive("mute", Knobs()).silent = True
+    compax.after(0.2, lambda: signal.raise_signal(signal.SIGINT))
+    outcome = compax("move", "sim://compax?name=mute", "5")
+    assert outcome.code == 130
+    assert outcome.err.strip() == "Interrupted. Nothing goes on that this command had set in motion."
 
 
 def test_a_stop_that_is_not_acknowledged_is_said_to_be_none(compax: Commands, x: SimulatedDrive) -> None:

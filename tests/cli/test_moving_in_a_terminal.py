@@ -165,6 +165,19 @@ async def test_a_terminal_that_is_held_by_ctrl_s_does_not_keep_a_signal_from_sto
     assert drive.position < 2000 / 3
 
 
+async def test_a_yes_that_was_typed_ahead_is_none(
+    open_terminal: Callable[..., Terminal], url: str, drive: SimulatedDrive
+) -> None:
+    terminal = open_terminal("params", "set", url, "P40=1.5")
+    terminal.types("y\n")
+    await terminal.sees("[y/N] ")
+    terminal.types("n\n")
+    code, told = await terminal.ends()
+    assert code == 0
+    assert "Nothing was written." in told
+    assert not [line for line in drive.log.texts(LogKind.LINE) if "=" in line]
+
+
 async def test_a_wrong_port_is_told(open_terminal: Callable[..., Terminal]) -> None:
     code, told = await open_terminal("home", "serial:///dev/ttyNoSuchPort").ends()
     assert code == 3

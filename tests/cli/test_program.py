@@ -11,6 +11,7 @@ import pytest
 from tests.fakes.commands import Commands
 
 from compax_aio import DriveSettings
+from compax_aio.compax.program_run import ProgramRun
 from compax_aio.simulator.compax import Knobs, LogKind, SimulatedDrive
 
 X = "sim://compax?name=x"
@@ -229,6 +230,42 @@ def test_without_wait_it_goes_on(compax: Commands, loaded: SimulatedDrive) -> No
     go_on(compax, 1.0)
     assert loaded.moving
     assert "STOP" not in loaded.log.texts(LogKind.LINE)
+
+
+def test_one_that_was_let_go_on_is_not_said_to_be_stopped(
+    compax: Commands, loaded: SimulatedDrive, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    let_go_on = ProgramRun.let_go_on
+
+    def let_go_on_and_interrupt(program: ProgramRun) -> None:
+        let_go_on(program)
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(ProgramRun, "let_go_on", let_go_on_and_interrupt)
+    outcome = compax("program", "run", X, "--name", "x")
+    assert outcome.code == 130
+    assert "Interrupted. x runs its program, and nobody watches it." in outcome.told
+    assert "was stopped" not in outcome.told
+    go_on(compax, 1.0)
+    assert loaded.moving
+
+
+def test_one_that_has_ended_is_not_said_to_be_stopped(
+    compax: Commands, x: SimulatedDrive, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    x.load_program(["POSA 10", "END"])
+
+    wait_finished = ProgramRun.wait_finished
+
+    async def wait_until_its_end_and_interrupt(program: ProgramRun, timeout_s: float | None) -> None:
+        await wait_finished(program, timeout_s)
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(ProgramRun, "wait_finished", wait_until_its_end_and_interrupt)
+    outcome = compax("program", "run", X, "--wait", "--name", "x")
+    assert outcome.code == 130
+    assert outcome.told.endswith("Interrupted. The program of x had ended before.")
+    assert "STOP" not in x.log.texts(LogKind.LINE)
 
 
 def test_ctrl_c_stops_program_and_axis(compax: Commands, loaded: SimulatedDrive) -> None:

@@ -215,7 +215,7 @@ def test_a_signal_ends_the_command_after_what_it_does_last(
     before = signal.getsignal(number)
     assert carried_out(command) == code
     assert stopped == ["axis"]
-    assert "what this command had set in motion was stopped" in capsys.readouterr().err.lower()
+    assert "nothing goes on that this command had set in motion" in capsys.readouterr().err.lower()
     assert signal.getsignal(number) is before
 
 

@@ -9,6 +9,7 @@ from typing import Final
 
 from compax_aio import InvalidCommandError
 
+from .keyboard import forget_typed
 from .printing import notes_console
 
 __all__ = ["confirm", "expect_somebody"]
@@ -37,6 +38,7 @@ async def confirm(question: str) -> bool:
         if not answer.done():
             answer.set_result(os.read(descriptor, _LONGEST))
 
+    forget_typed()  # nobody has answered what was not asked yet
     notes_console().print(f"{question} [y/N] ", end="", markup=False)
     loop.add_reader(descriptor, take)
     try:

@@ -136,7 +136,7 @@ class Interruption:
         if self.moving:
             each = "each stands" if len(self.moving) > 1 else "it stands"
             return f"Interrupted. Stopped: {', '.join(self.moving)}; {each}."
-        return "Interrupted. What this command had set in motion was stopped, and it stands."
+        return "Interrupted. Nothing goes on that this command had set in motion."
 
     @property
     def note(self) -> str | None:

@@ -10,7 +10,7 @@ from typing import Final
 
 from compax_aio import InvalidCommandError
 
-__all__ = ["expect_keyboard", "keys_pressed"]
+__all__ = ["expect_keyboard", "forget_typed", "keys_pressed"]
 
 _ESCAPE_PAUSE_S: Final = 0.1
 """An Escape that nothing follows for so long is the key; arrows begin with the same character."""
@@ -62,7 +62,7 @@ def keys_pressed(on_key: Callable[[str], None], on_end: Callable[[], None]) -> I
             lambda: tell([str(getattr(each.key, "value", each.key)) for each in source.flush_keys()]),
         )
 
-    _forget_typed()
+    forget_typed()
     try:
         with source.raw_mode(), source.attach(take):
             yield
@@ -72,8 +72,9 @@ def keys_pressed(on_key: Callable[[str], None], on_end: Callable[[], None]) -> I
         source.close()
 
 
-def _forget_typed() -> None:
-    with suppress(ImportError, OSError):
+def forget_typed() -> None:
+    """Forget what was typed at the terminal, and not read yet: who typed it did not know what it would answer."""
+    with suppress(ImportError, OSError, ValueError):
         import termios  # noqa: PLC0415 - Windows has none
 
         termios.tcflush(sys.stdin.fileno(), termios.TCIFLUSH)

@@ -99,6 +99,15 @@ async def test_a_motion_without_a_yes_is_never_sent(answer: str) -> None:
         assert not person.did(LogKind.MOTION_STARTED)
 
 
+async def test_a_yes_that_was_typed_before_it_was_asked_for_is_none() -> None:
+    async with sitting(may_move=False) as person:
+        person.press(f"PA5{ENTER}yes{ENTER}")
+        await person.sees("PA5 can move the axis")
+        assert "the drive has taken it" not in await person.quiet()
+        assert not person.did(LogKind.MOTION_STARTED)
+        await person.say("yes", "the drive has taken it")
+
+
 async def test_ctrl_c_and_a_stop_are_no_yes() -> None:
     async with sitting(may_move=False) as person:
         await person.say("PA5", "move? yes/no>")
@@ -184,6 +193,35 @@ async def test_a_stop_goes_ahead_of_what_waits_and_takes_it_back(word: str) -> N
         assert not person.did(LogKind.MOTION_STARTED)
 
 
+async def test_a_stop_is_a_stop_while_nobody_says_yet_where_the_one_before_has_ended(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async with sitting(**SLOW) as person:
+        await person.say("move 20", "on its way")
+        answer: asyncio.Future[float] = asyncio.get_running_loop().create_future()
+        monkeypatch.setattr(person.drive, "position", lambda: answer)
+        person.press(CTRL_X)
+        await until(lambda: bool(person.did(LogKind.MOTION_STOPPED)), lambda: "the first stop")
+        await until(lambda: "STOP is under way" not in person.bottom, lambda: person.bottom)
+        await person.say("move 10", "on its way")
+        person.press(CTRL_X)
+        await until(lambda: len(person.did(LogKind.MOTION_STOPPED)) == 2, lambda: "the second stop")
+        answer.set_result(7.0)
+        await person.sees("stands at 7.00")
+
+
+async def test_a_status_that_was_asked_before_a_motion_does_not_end_it() -> None:
+    async with sitting(poll_s=1.0, answer_time_s=0.2, **SLOW) as person:
+        seen = len(person.lines())
+        await until(lambda: person.lines()[seen:][-1:] == ["S17"], lambda: "a look at the status")
+        await person.say("PA50", "it may be moving now")
+        for _ in range(20):
+            await asyncio.sleep(0.1)
+            assert "PA50 may still be moving it" in person.bottom
+        person.press(CTRL_C)
+        await person.sees("the drive has acknowledged STOP and stands")
+
+
 async def test_a_stop_that_is_not_acknowledged_is_told_as_what_it_is() -> None:
     cable = Cable()
     async with sitting(cable=cable, settings=DriveSettings(stop_timeout_s=2), **SLOW) as person:
@@ -266,6 +304,16 @@ async def test_comparators_and_unasked_text_are_told() -> None:
         await person.say("POSA 20$", "comparator 1 was passed", "reached")
         person.far.inject(b"hello\x1b[31m\r\n>")
         await person.sees("unasked  hello\\x1b[31m")
+
+
+async def test_a_line_that_floods_is_told_now_and_then() -> None:
+    async with sitting() as person:
+        for _ in range(500):
+            person.far.inject(b"garbage\r\n>")
+        await person.sees("unasked  garbage")
+        assert (await person.quiet(10.0)).count("unasked") < 3
+        person.far.inject(b"more\r\n>")
+        await person.sees("unasked  more (", "more before it)")
 
 
 async def test_a_fault_is_told_with_what_to_do() -> None:

@@ -24,6 +24,7 @@ from compax_aio.compax.facts.limits import MAX_POSITION
 from compax_aio.compax.vocabulary import plan_home
 from compax_aio.errors import CompaxError, ConnectionLostError, MoveInDoubtError
 
+from ..unasked import UnaskedText
 from .diary import Diary
 from .levels import Level
 from .orders import Farewell, Orders
@@ -35,8 +36,6 @@ __all__ = ["MonitoredAxis"]
 _FIRST_PAUSE_S: Final = 1.0
 _LONGEST_PAUSE_S: Final = 10.0
 _LEAST_DETAILS_S: Final = 0.4
-_SAME_TEXT_S: Final = 5.0
-"""Unexpected texts are told so rarely: a line that floods must not push all else out of the diary."""
 
 _ANY_MOTION: Final = "a motion"
 
@@ -70,8 +69,7 @@ class MonitoredAxis:
         self._again = asyncio.Event()
         self._openings = 0
         self._error_was_asked = False
-        self._strays_untold = 0
-        self._stray_told_at = float("-inf")
+        self._unasked = UnaskedText()
 
     @property
     def name(self) -> str:
@@ -247,11 +245,8 @@ class MonitoredAxis:
             )
 
     def _take_stray(self, event: UnexpectedText) -> None:
-        self._strays_untold += 1
-        if self._now() - self._stray_told_at >= _SAME_TEXT_S:
-            before = f" ({self._strays_untold - 1} more before it)" if self._strays_untold > 1 else ""
-            self._tell(f"unexpected text {event.text[:60]!r}{before}", Level.ATTENTION)
-            self._strays_untold, self._stray_told_at = 0, self._now()
+        if (told := self._unasked.take(repr(event.text[:60]))) is not None:
+            self._tell(f"unexpected text {told}", Level.ATTENTION)
 
     # The end --------------------------------------------------------------------------------------------------------
 

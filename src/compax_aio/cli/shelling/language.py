@@ -204,16 +204,23 @@ class Language:
 
     def _stop(self, text: str, words: list[str]) -> Order:
         _expect_no_more(text, words)
-        return Order(text=text, carry_out=self.stop, is_stop=True)
+        return Order(text=text, carry_out=self._stop_and_say, is_stop=True)
 
-    async def stop(self) -> Reply:
-        """Stop the axis, and say where it stands; raises as ``Drive.stop`` does."""
+    async def _stop_and_say(self) -> Reply:
+        await self.stop()
+        return await self.stopped()
+
+    async def stop(self) -> None:
+        """Stop the axis; raises as ``Drive.stop`` does."""
         try:
             await self._drive.stop()
         except CompaxError:
             self._underway.note_unseen("what was not stopped", self._now())
             raise
         self._underway.note_standstill()
+
+    async def stopped(self) -> Reply:
+        """Say, after a stop, where the axis stands."""
         try:
             position: float | None = await self._drive.position()
         except CompaxError:

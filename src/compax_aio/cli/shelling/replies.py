@@ -21,6 +21,7 @@ from ...compax.moves import Move, MoveResult
 from ...compax.settings import DriveSettings
 from ...errors import AnswerTimeoutError, CompaxError, MoveStoppedError, UnexpectedAnswerError
 from ...escaping import escaped
+from ..unasked import UnaskedText
 
 __all__ = ["Reply", "told_error", "told_event", "told_move"]
 
@@ -40,8 +41,8 @@ class Reply:
     """A move that was accepted, and whose end is to be awaited."""
 
 
-def told_event(event: DriveEvent) -> Text | None:
-    """Say what a drive, or its line, did unasked; None for what this shell has no words for."""
+def told_event(event: DriveEvent, unasked: UnaskedText) -> Text | None:
+    """Say what a drive, or its line, did unasked; None for what is not told, or not now."""
     match event:
         case PositionMessage():
             sign, style, rest = "$", "bold green", "position reached"
@@ -55,8 +56,8 @@ def told_event(event: DriveEvent) -> Text | None:
             sign, style, rest = "LINE BACK", "bold green", f"after {lost_for_s:.1f} s"
             if signs:
                 rest += f"; the drive seems to have been switched off and on: {' and '.join(signs)}. {_AFTER_RESTART}"
-        case UnexpectedText(text=came):
-            sign, style, rest = "unasked", "yellow", came
+        case UnexpectedText(text=came) if (told := unasked.take(came)) is not None:
+            sign, style, rest = "unasked", "yellow", told
         case _:
             return None
     return Text.assemble((sign, style), "  ", escaped(rest))

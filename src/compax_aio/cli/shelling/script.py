@@ -17,6 +17,7 @@ from ...errors import CompaxError, InvalidCommandError
 from ...escaping import escaped
 from ..interruption import in_motion
 from ..printing import Printing
+from ..unasked import UnaskedText
 from .language import Language, Order
 from .replies import Reply, told_event, told_move
 from .underway import Underway
@@ -43,6 +44,7 @@ class Script:
         self._printing = printing
         self._may_move = may_move
         self._underway = Underway()
+        self._unasked = UnaskedText()
         self._language = Language(drive, self._underway)
 
     def check(self, lines: Iterable[str]) -> None:
@@ -112,7 +114,7 @@ class Script:
 
     async def _tell_events(self) -> None:
         async for event in self._drive.events():
-            if (text := told_event(event)) is not None:
+            if (text := told_event(event, self._unasked)) is not None:
                 self._printing.note(text.plain)
 
     async def _tell_what_runs(self) -> None:

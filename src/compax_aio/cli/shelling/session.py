@@ -13,6 +13,7 @@ from typing import Final
 
 from prompt_toolkit import PromptSession
 from prompt_toolkit.formatted_text import ANSI, AnyFormattedText
+from prompt_toolkit.input.typeahead import clear_typeahead
 from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
 from prompt_toolkit.shortcuts import print_formatted_text
 from rich.console import Console
@@ -22,6 +23,8 @@ from ...compax.drive import Drive
 from ...compax.events import ConnectionLost, ConnectionRestored, Fault
 from ...compax.moves import Move
 from ...errors import CompaxError, ConnectionLostError, InvalidCommandError, MoveInDoubtError
+from ..keyboard import forget_typed
+from ..unasked import UnaskedText
 from .completion import LineCompleter
 from .language import Language, Order
 from .replies import Reply, told_error, told_event, told_move
@@ -64,6 +67,7 @@ class Session:
         self._poll_s = poll_s
         self._may_move = may_move
         self._underway = Underway()
+        self._unasked = UnaskedText()
         self._language = Language(drive, self._underway)
         self._standing = Standing(is_open=drive.is_open)
         self._turns = Turns(self._replied, self._failed, self._dropped)
@@ -143,11 +147,17 @@ class Session:
         moving = [order.text for order in orders if order.can_move]
         if moving and not self._may_move:
             self._asked = orders
+            self._forget_typed()
             self._tell(
                 Text.assemble((f"{', '.join(moving)} can move the axis; nothing was sent. ", _YELLOW), _QUESTION)
             )
         else:
             self._take(orders)
+
+    def _forget_typed(self) -> None:
+        """Hear no answer to a question that nobody has seen: the rest of a paste, or what was typed ahead."""
+        clear_typeahead(self._prompt.app.input)
+        forget_typed()
 
     def _understand(self, line: str) -> Order:
         word, *words = line.split()
@@ -243,12 +253,16 @@ class Session:
 
     async def _carry_out_stop(self) -> None:
         try:
-            reply = await self._language.stop()
+            await self._language.stop()
         except CompaxError as error:
             self._tell(told_error(error))
             self._tell(Text("THE AXIS MAY STILL BE MOVING: use the stop in hardware", "bold red"))
         else:
-            self._tell(reply.people or Text())
+            # Aside: what is pressed from now on is a stop of its own, though nobody says yet where the axis stands.
+            self._tasks.create_task(self._tell_stopped())
+
+    async def _tell_stopped(self) -> None:
+        self._tell((await self._language.stopped()).people or Text())
 
     def _stop_done(self, task: asyncio.Task[None]) -> None:  # noqa: ARG002
         self._stop = None
@@ -276,12 +290,13 @@ class Session:
                 self._standing.error = event.error
             if isinstance(event, ConnectionLost | ConnectionRestored):
                 self._standing.is_open = isinstance(event, ConnectionRestored)
-            if (text := told_event(event)) is not None:
+            if (text := told_event(event, self._unasked)) is not None:
                 self._tell(text)
             self._redraw()
 
     async def _poll(self, interval_s: float) -> None:
         """Look at position and status now and then; the poller lets everybody else go first."""
+        begun_at = asyncio.get_running_loop().time()
         with suppress(ConnectionLostError):  # it is told as an event
             async for reading in self._drive.watch("position", "status", interval_s=interval_s):
                 settings = self._drive.settings
@@ -291,7 +306,9 @@ class Session:
                 )
                 self._standing.status = status
                 if status is not None:
-                    self._underway.note_status(status, reading.at)
+                    # It was asked for at some time since the last reading, and may be older than a motion since then.
+                    self._underway.note_status(status, begun_at)
+                begun_at = reading.at
                 self._redraw()
 
     # Telling --------------------------------------------------------------------------------------------------------
