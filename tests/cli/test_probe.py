@@ -246,6 +246,8 @@ async def test_a_query_that_is_not_answered_ends_nothing() -> None:
     ("answer", "style", "says"),
     [
         (b"syntax error\r\n>", ErrorStyle.OTHER_TEXT, "error_pattern"),
+        (b"E07\r\n>", ErrorStyle.CODE, "its code alone"),
+        (b"E07 no\r\n>", ErrorStyle.CODE_AND_TEXT, "with text"),
         (b"S999: 5\r\n>", ErrorStyle.UNKNOWN, "refused nothing"),
     ],
 )
@@ -264,6 +266,19 @@ async def test_an_echo_now_and_then_is_not_taken_for_one() -> None:
     report = await probed_as({"S2": b"S2\rS002: 0.00\r\n>"})
     assert report.echo is None
     assert "somebody else" in found(report, "echo").found
+
+
+async def test_of_an_echo_nothing_is_claimed_where_nothing_was_answered() -> None:
+    markers = iter([b"S017: 00000000\r\n>"])
+    name = f"refusing-{next(numbers)}"
+    with await listen(name, lambda: ScriptedFarEnd(lambda _: next(markers, b"E90\r\n>"))):
+        report = await probe(f"loop://{name}")
+    finding = found(report, "echo")
+    assert (report.echo, finding.found, finding.founded) == (None, "not known", Founded.UNKNOWN)
+
+
+async def test_that_the_axis_stands_is_not_claimed_of_a_bit_that_does_not_say_so() -> None:
+    assert "no positioning runs" in found(await probed(), "state").found
 
 
 async def test_s16_that_is_no_status_is_not_decoded() -> None:

@@ -62,8 +62,8 @@ async def probe(
     Find out how a drive talks, and write it to a settings file.
 
     Asks for baud rate, handshake, echo, the form of error replies, P20, the unit and travel of the axis, and says of
-    each how well it is founded. Only questions are sent: nothing moves, nothing is written to the drive, whatever is
-    at the far end. What only a move could show is said to be unknown.
+    each how well it is founded. Only questions are sent: nothing moves, whatever is at the far end, and nothing is
+    written to the drive. What only a move could show is said to be unknown.
 
     ```sh
     compax probe serial:///dev/ttyUSB0

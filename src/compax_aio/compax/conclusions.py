@@ -135,6 +135,9 @@ def _has_echo(query: str, raw: str) -> bool:
 
 def _echo(evidence: Evidence) -> Finding:
     is_echoed = _is_echoed(evidence)
+    if not any(evidence.raw.values()):
+        told = "every query was refused, and what came with the refusals is not kept"
+        return Finding(topic="echo", found="not known", founded=Founded.UNKNOWN, evidence=told)
     if is_echoed is None:
         return Finding(
             topic="echo",
@@ -254,7 +257,7 @@ def _state(evidence: Evidence) -> Finding:
         _fault(evidence) if not status.no_fault else "no fault",
         *["a warning"] * (not status.no_warning),
         "powered" if status.running else "power stage off",
-        "moving" if status.command_active else "standing",
+        "a positioning runs" if status.command_active else "no positioning runs",
         "machine zero approached" if status.machine_zero_approached else "machine zero not approached",
     ]
     return Finding(

@@ -1,7 +1,7 @@
 """
 Finding out how a drive talks, by questions alone.
 
-Nothing is sent that can move anything, write anything or switch anything, whatever is at the far end:
+Nothing is sent that can move or switch anything, whatever is at the far end, or write anything to a COMPAX:
 
 - Until a prompt of a COMPAX has come, only status queries go out (``S17``, ``S16``, ``S30``, ``S2`` …), as whenever a
   line is brought in step. To an AMS SMC ``S`` stores what it holds already, to a CAMM-1 cutter it is the size of
@@ -16,6 +16,7 @@ Nothing is sent that can move anything, write anything or switch anything, whate
 from __future__ import annotations
 
 import asyncio
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Final
@@ -40,6 +41,7 @@ UNKNOWN_STATUS: Final = "S999"
 
 _RATED_SCHEMES: Final = ("serial", "rfc2217")
 """Where the baud rate is ours to choose."""
+_CODE_ALONE: Final = re.compile(r"E\d+")
 _IDENTIFICATION: Final = range(31, 40)
 _QUERIES: Final = ("S16", "S17", "S1", "S2", "S30", "S18", "P19", "P20", "P90", "P11", "P12")
 
@@ -234,7 +236,7 @@ class _Prober:
             answer = await self._line.query(UNKNOWN_STATUS)
         except CommandRejectedError as error:
             received = (error.received or "").strip()
-            style = ErrorStyle.CODE if received == f"E{error.code}" else ErrorStyle.CODE_AND_TEXT
+            style = ErrorStyle.CODE if _CODE_ALONE.fullmatch(received) else ErrorStyle.CODE_AND_TEXT
             return style, f"{UNKNOWN_STATUS} was answered by {received!r}"
         except AnswerTimeoutError:
             texts = [text for text in self._strays if text]
