@@ -6,11 +6,12 @@ import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
+from typing import Literal
 
 import pytest
 
 from compax_aio.errors import InvalidCommandError, TransportError
-from compax_aio.simulator.compax import LogKind, SimulatedDrive
+from compax_aio.simulator.compax import Knobs, LogKind, SimulatedDrive
 from compax_aio.simulator.far_end import FarEnd
 from compax_aio.simulator.faulty_cable import Noise
 from compax_aio.simulator.outlet import Outlet, pty_outlet, tcp_outlet
@@ -181,6 +182,65 @@ async def test_an_unplugged_cable_is_noticed_and_can_be_plugged_in_again() -> No
     assert "plugged in: loop://far-end" in stage.said
 
 
+async def test_a_cable_is_where_it_was_put_last_however_fast() -> None:
+    stage = Stage()
+    async with stage.connected() as host:
+        for _ in range(3):
+            stage.begin("unplug")
+            stage.end("unplug")
+        await asyncio.sleep(0.1)
+        assert host.lost
+        (await stage.connect()).transport.abort()
+        stage.begin("unplug", lasts_s=0)
+        await asyncio.sleep(0.1)
+        (await stage.connect()).transport.abort()
+        stage.begin("unplug")
+        stage.end("unplug")
+        stage.begin("unplug")
+        await asyncio.sleep(0.1)
+        assert not stage.outlet.is_plugged
+        assert stage.said[-1] == "unplug"
+
+
+async def test_a_cable_that_is_out_cannot_be_cut() -> None:
+    stage = Stage()
+    async with stage.connected():
+        stage.begin("unplug")
+        stage.begin("cut")
+        await asyncio.sleep(0.1)
+        assert not stage.outlet.is_plugged
+        assert stage.said == ["unplug", "cut, but the cable is out"]
+        stage.end("unplug")
+        stage.begin("cut")
+        stage.begin("unplug")
+        await asyncio.sleep(0.1)
+        assert not stage.outlet.is_plugged
+
+
+async def test_what_is_no_trouble_is_not_said_to_end() -> None:
+    stage = Stage()
+    async with stage.connected():
+        for name in ("silent", "held", "power", "unplug"):
+            stage.end(name)
+        assert stage.said == []
+        stage.begin("power")
+        stage.begin("power", 1)
+        stage.begin("late", amount_s=0.3)
+        await asyncio.sleep(2)
+        assert stage.said == ["power", "power for 1 s", "late by 0.3 s", "the power is back"]
+        assert isinstance(stage.device, SimulatedDrive)
+        assert stage.device.log.texts(LogKind.POWER) == ["off", "on"]
+
+
+async def test_silence_is_told_once_an_answer() -> None:
+    stage = Stage(device=SimulatedDrive(Knobs(baudrate=9600), name="x"))
+    async with stage.connected() as host:
+        stage.begin("silent")
+        for _ in range(2):
+            assert await host.ask() == b""
+        assert stage.said == ["silent", *["silent: what the device sends is kept from the host"] * 2]
+
+
 async def test_a_cut_line_is_there_again_at_once() -> None:
     stage = Stage()
     async with stage.connected() as host:
@@ -229,6 +289,37 @@ async def test_healing_ends_everything_that_is_done_to_bytes() -> None:
         assert await host.ask() == b""
         stage.far_end.heal()
         assert await host.ask() == ANSWER
+
+
+async def test_what_has_its_time_later_comes_after_healing_too() -> None:
+    stage = Stage("lost=1@5s", "late=1:5s@5s")
+    async with stage.connected() as host:
+        stage.far_end.heal()
+        assert await host.ask() == ANSWER
+        await asyncio.sleep(5)
+        assert await host.ask() == b""
+        stage.far_end.set_noise(kind_named("lost"), 0)
+        assert await host.ask() == b""
+        await asyncio.sleep(5)
+        assert ANSWER in host.heard
+
+
+@pytest.mark.parametrize("mode", ["party", "daisy", "single"])
+async def test_commands_of_steppers_are_counted_by_what_ends_them(mode: Literal["party", "daisy", "single"]) -> None:
+    stage = Stage("silent=1:9s", device=SimulatedPartyLine(SmcKnobs(mode=mode), name="bus"))
+    async with stage.connected() as host:
+        host.transport.write({"party": b"\nAZ 0\n", "daisy": b"AZ 0\n", "single": b"Z 0\r"}[mode])
+        await asyncio.sleep(1)
+    assert stage.said[0] == "silent for 9 s"
+
+
+async def test_a_spell_of_no_time_by_chance_is_over_at_once() -> None:
+    stage = Stage("unplug=1:0s@0s+1s")
+    async with stage.connected() as host:
+        await host.ask()
+        await asyncio.sleep(2)
+        assert host.lost
+        assert stage.outlet.is_plugged
 
 
 async def test_only_drives_have_faults_of_drives() -> None:

@@ -119,6 +119,10 @@ async def test_a_flood_at_the_wrong_rate_is_kept_within_bounds() -> None:
 # The link
 
 
+def names_in(folder: Path) -> list[str]:
+    return [each.name for each in folder.iterdir()]
+
+
 async def test_a_link_leads_to_the_port_and_is_taken_away(tmp_path: Path) -> None:
     link = tmp_path / "x"
     async with serve_pty(SimulatedDrive(), link=link) as url:
@@ -132,6 +136,36 @@ async def test_a_link_to_a_port_that_is_gone_is_replaced(tmp_path: Path) -> None
     link.symlink_to("/dev/pts/987654")
     async with serve_pty(SimulatedDrive(), link=link):
         assert link.is_char_device()
+
+
+async def test_a_link_of_one_that_was_killed_is_replaced_although_its_port_has_become_ours(tmp_path: Path) -> None:
+    link = tmp_path / "x"
+    async with serve_pty(SimulatedDrive()) as url:
+        link.symlink_to(url.removeprefix("serial://"))
+    async with serve_pty(SimulatedDrive(), link=link) as url:  # the system gives the lowest number that is free
+        assert link.is_char_device()
+    assert not link.is_symlink()
+    assert names_in(tmp_path) == []
+
+
+async def test_a_link_that_somebody_else_makes_at_the_same_time_is_theirs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    link = tmp_path / "x"
+    link.symlink_to("/dev/pts/987654")
+    rename = Path.rename
+
+    def rename_late(self: Path, target: Path) -> Path:
+        link.unlink()
+        link.symlink_to("/dev/tty")
+        return rename(self, target)
+
+    monkeypatch.setattr(Path, "rename", rename_late)
+    with pytest.raises(TransportError, match="is there already"):
+        async with serve_pty(SimulatedDrive(), link=link):
+            pass
+    assert str(link.readlink()) == "/dev/tty"
+    assert names_in(tmp_path) == ["x"]
 
 
 @pytest.mark.parametrize("kind", ["file", "link to a file", "link to a port", "link to nothing"])

@@ -191,6 +191,7 @@ class Stateless:
     """A device that is served, and keeps nothing."""
 
     name = "lamp"
+    baudrate = 0
     served_by: Host | None = None
 
     def receive(self, data: bytes, now: float) -> None: ...

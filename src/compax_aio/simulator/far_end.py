@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from random import Random
 from typing import Protocol, runtime_checkable
 
+from compax_aio.compax.facts.line import COMMAND_END
 from compax_aio.errors import CompaxError, InvalidCommandError
 
 from .faulty_cable import FaultyCable, Noise
@@ -29,6 +30,13 @@ class _Powered(Protocol):
 
 
 @runtime_checkable
+class _Commanded(Protocol):
+    @property
+    def command_end(self) -> bytes:
+        """What ends a command on its line."""
+
+
+@runtime_checkable
 class _Faulty(Protocol):
     def raise_fault(self, code: int) -> None:
         """Have a fault or warning come."""
@@ -46,6 +54,10 @@ class _ByChance:
     def happens(self) -> bool:
         """Draw for one command."""
         return self.is_due and (self.fault.chance is None or self.random.random() < self.fault.chance)
+
+
+def _command_end_of(device: SimulatedDevice) -> bytes:
+    return device.command_end if isinstance(device, _Commanded) else COMMAND_END
 
 
 class FarEnd:
@@ -82,12 +94,13 @@ class FarEnd:
         self._say = say
         self._loop = asyncio.get_running_loop()
         self._line = DeviceLine.of(device)
-        self._cable = FaultyCable(say, on_command=self._draw, on_cut=self._on_cut)
+        self._cable = FaultyCable(_command_end_of(device), say, on_command=self._draw, on_cut=self._on_cut)
         self._by_chance: list[_ByChance] = []
         self._ends: dict[str, asyncio.TimerHandle] = {}
         self._timetable: list[asyncio.TimerHandle] = []
         self._tasks: set[asyncio.Task[None]] = set()
         self._is_powered = True
+        self._is_unplugged = False
         self._random = Random(f"{seed} {device.name}")
         for fault in self._faults:
             self.expect_possible(fault.kind)
@@ -167,7 +180,7 @@ class FarEnd:
                 self._say("the line is cut within the answer")
                 self._cable.cut_within_answer(self._random)
             elif happens and kind.name not in self._ends:
-                self.begin(kind, each.fault.amount_s or None)
+                self.begin(kind, each.fault.amount_s)
 
     # What can be done to it
 
@@ -183,10 +196,18 @@ class FarEnd:
         if (end := self._ends.pop(kind.name, None)) is not None:
             end.cancel()
         if kind.code is None:  # it is in the log of the drive
-            self._say(kind.name if lasts_s is None or kind.nature == "moment" else f"{kind.name} for {lasts_s:g} s")
+            self._say(self._told(kind, lasts_s, amount_s))
         self._start(kind, amount_s)
         if lasts_s is not None and kind.nature != "moment":
             self._ends[kind.name] = self._loop.call_later(lasts_s, self.end, kind)
+
+    def _told(self, kind: FaultKind, lasts_s: float | None, amount_s: float | None) -> str:
+        """Say what begins, in words."""
+        if kind.nature == "answering":
+            return f"{kind.name} by {kind.amount_s if amount_s is None else amount_s:g} s"
+        if kind.nature == "moment":
+            return f"{kind.name}, but the cable is out" if self._is_unplugged else kind.name
+        return kind.name if lasts_s is None else f"{kind.name} for {lasts_s:g} s"
 
     def _start(self, kind: FaultKind, amount_s: float | None) -> None:
         if kind.code is not None and isinstance(self.device, _Faulty):
@@ -197,12 +218,13 @@ class FarEnd:
             self._cable.is_silent = True
         elif kind.name == "held":
             self._line.hold(held=True)
-        elif kind.name == "power" and isinstance(self.device, _Powered):
+        elif kind.name == "power" and self._is_powered and isinstance(self.device, _Powered):
             self._is_powered = False
             self.device.power_off()
         elif kind.name == "unplug":
+            self._is_unplugged = True
             self._do(self.outlet.unplug)
-        elif kind.name == "cut":
+        elif kind.name == "cut" and not self._is_unplugged:
             self._on_cut()
 
     def end(self, kind: FaultKind) -> None:
@@ -214,14 +236,15 @@ class FarEnd:
         elif kind.name == "silent" and self._cable.is_silent:
             self._cable.is_silent = False
             self._say("it is heard again")
-        elif kind.name == "held":
+        elif kind.name == "held" and self._line.is_held:
             self._line.hold(held=False)
             self._say("what the host writes is taken again")
         elif kind.name == "power" and not self._is_powered and isinstance(self.device, _Powered):
             self._is_powered = True
             self._say("the power is back")
             self.device.power_on()
-        elif kind.name == "unplug" and not self.outlet.is_plugged:
+        elif kind.name == "unplug" and self._is_unplugged:
+            self._is_unplugged = False
             self._do(self._plug)
 
     def _answer_so(self, kind: FaultKind, amount_s: float) -> None:
@@ -239,9 +262,10 @@ class FarEnd:
         self._say(f"{kind.name}: {chance:g} of all bytes")
 
     def heal(self) -> None:
-        """End all that is done to bytes, and what would befall commands by chance."""
+        """End all that is done to bytes, and what befalls commands by chance; what has its time later still comes."""
         self._cable.heal()
-        self._by_chance.clear()
+        for each in self._by_chance:
+            each.is_due = False
         self._say("healed")
 
     def _on_cut(self) -> None:
@@ -253,8 +277,9 @@ class FarEnd:
         await self._plug()
 
     async def _plug(self) -> None:
-        await self.outlet.plug()
-        self._say(f"plugged in: {self.outlet.url}")
+        if not self._is_unplugged:  # again, meanwhile
+            await self.outlet.plug()
+            self._say(f"plugged in: {self.outlet.url}")
 
     def _do(self, work: Callable[[], Awaitable[None]]) -> None:
         async def told() -> None:

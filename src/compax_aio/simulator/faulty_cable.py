@@ -7,8 +7,6 @@ from dataclasses import dataclass, field
 from random import Random
 from typing import Final
 
-from compax_aio.compax.facts.line import COMMAND_END
-
 from .cable import Cable, Direction, Tamper
 
 __all__ = ["FaultyCable", "Noise"]
@@ -52,6 +50,7 @@ class FaultyCable(Cable):
     The cable of a device that is served with faults.
 
     Args:
+        command_end: What ends a command on this line.
         note: Called with what befalls the line, in words.
         on_command: Called when the end of a command comes from the host, before anything is done about it.
         on_cut: Called when the line is cut, behind what has arrived.
@@ -62,9 +61,16 @@ class FaultyCable(Cable):
     """
 
     def __init__(
-        self, note: Callable[[str], None], *, on_command: Callable[[], None], on_cut: Callable[[], None]
+        self,
+        command_end: bytes,
+        note: Callable[[str], None],
+        *,
+        on_command: Callable[[], None],
+        on_cut: Callable[[], None],
     ) -> None:
         super().__init__()
+        self._command_end = command_end
+        self._is_silence_told = False
         self._note = note
         self._on_command = on_command
         self._on_cut = on_cut
@@ -97,10 +103,13 @@ class FaultyCable(Cable):
     def tampered(self, direction: Direction, data: bytes) -> tuple[bytes, bool]:
         """Do to *data* what is due; also say whether the connection is cut behind it."""
         if direction == "to_drive":
-            for _ in range(data.count(COMMAND_END)):
+            for _ in range(data.count(self._command_end)):
+                self._is_silence_told = False
                 self._on_command()
         elif self.is_silent:
-            self.note(f"silent: {data!r} was kept from the host")
+            if data and not self._is_silence_told:  # once an answer, which may come byte by byte
+                self._is_silence_told = True
+                self.note("silent: what the device sends is kept from the host")
             return b"", False
         return super().tampered(direction, self._noisy(direction, data) if self.noises else data)
 

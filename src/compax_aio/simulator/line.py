@@ -86,6 +86,11 @@ class DeviceLine:
         """Whether somebody is connected."""
         return self._write is not None
 
+    @property
+    def is_held(self) -> bool:
+        """Whether what is written is left with who is connected."""
+        return self._is_held
+
     def lay(self, cable: Cable) -> None:
         """Let what goes over this line befall what *cable* says, from the next connection on."""
         self._cable = cable

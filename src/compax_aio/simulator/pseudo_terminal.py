@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+import secrets
 import tty
 from pathlib import Path
 from typing import Final
@@ -40,7 +41,7 @@ class PseudoTerminal:
     Args:
         line: Of the device.
         link: A symbolic link to the port, with a name that stays the same; it is taken away at the end. A link that
-            leads to a port that is gone is replaced, as one of a program that was killed.
+            leads to a port that is gone, or has become ours since, is replaced, as one of a program that was killed.
 
     Attributes:
         path: Of the port.
@@ -138,8 +139,7 @@ class PseudoTerminal:
         if self._link is None:
             return
         try:
-            if self._link.is_symlink() and self._link.readlink().is_relative_to(_TERMINALS) and not self._link.exists():
-                self._link.unlink()
+            _take_stale_away(self._link, self.path)
             self._link.symlink_to(self.path)
         except FileExistsError:
             raise TransportError(
@@ -158,3 +158,21 @@ class PseudoTerminal:
     def _close_both(self) -> None:
         os.close(self._device_end)
         os.close(self._port_end)
+
+
+def _take_stale_away(link: Path, port: str) -> None:
+    """
+    Take *link* away if it leads to a port that is gone, or to *port*: then that of a program that was killed was alike.
+
+    It is set aside first, under a name that nobody knows, for somebody else may be making it anew at the same time.
+    """
+    if not link.is_symlink():
+        return
+    leads_to = link.readlink()
+    if not leads_to.is_relative_to(_TERMINALS) or (link.exists() and str(leads_to) != port):
+        return
+    aside = link.with_name(f".{link.name[:32]}.{secrets.token_hex(8)}")
+    link.rename(aside)
+    if not aside.is_symlink() or aside.readlink() != leads_to:
+        os.link(aside, link, follow_symlinks=False)  # it is theirs
+    aside.unlink()

@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterable, Mapping
 from enum import Enum, auto
 from typing import Any, Final
 
+from compax_aio.compax.facts.line import COMMAND_END
+
 from ..line import Host
 from . import replies
 from .binary import shown
@@ -90,6 +92,11 @@ class SimulatedDrive:
     def baudrate(self) -> int:
         """Baud rate of the serial port, as the knob says; 0: bytes take no time, and any rate will do."""
         return self.knobs.baudrate
+
+    @property
+    def command_end(self) -> bytes:
+        """CR."""
+        return COMMAND_END
 
     def receive(self, data: bytes, now: float) -> None:
         """Take bytes that the host sends at time *now*."""

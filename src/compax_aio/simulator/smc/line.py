@@ -9,6 +9,8 @@ from random import Random
 from types import MappingProxyType
 from typing import Any, Final
 
+from compax_aio.smc.facts import Mode
+
 from ..line import Host
 from ..state_file import load_state_file
 from .agenda import Agenda
@@ -90,6 +92,11 @@ class SimulatedPartyLine:
     def baudrate(self) -> int:
         """Baud rate of all axes, as the knob says; 0: bytes take no time, and any rate will do."""
         return self.knobs.baudrate
+
+    @property
+    def command_end(self) -> bytes:
+        """LF on a party line, else CR."""
+        return bytes([Mode(self.knobs.mode).terminator])
 
     def receive(self, data: bytes, now: float) -> None:
         """Take bytes that the host begins to send at time *now*."""
