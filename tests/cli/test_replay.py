@@ -240,3 +240,57 @@ def test_names_and_texts_of_others_forge_nothing(compax: Commands, tmp_path: Pat
     out = compax("replay", str(path)).out
     assert "\x1b" not in out
     assert len(out.splitlines()) == 8
+
+
+def test_details_and_shares_of_others_forge_nothing_either(compax: Commands, tmp_path: Path) -> None:
+    evil = "\x1b[2J\n"
+    names = ["Rejected", "ComparatorReached", "LateEnding"]
+    details = {"code": evil, "number": {evil: evil}, "sent": [evil] * 50}
+    path = write(tmp_path / "t", [(0.1 * at, "x", Noticed(name, details=details)) for at, name in enumerate(names)])
+    out = compax("replay", str(path)).out
+    assert "\x1b" not in out
+    assert len(out.splitlines()) == 5
+    assert max(map(len, out.splitlines())) < 200
+
+
+def test_json_of_others_is_one_line_each_that_no_terminal_heeds(compax: Commands, tmp_path: Path) -> None:
+    odd = "\x9b2J\x7f\u2028\u202e\udc80"
+    path = write(tmp_path / "t", [(0.0, odd, Received(b"\x9b2J")), (0.0, odd, Noticed(odd, details={odd: odd}))])
+    outcome = compax("replay", str(path), "--json")
+    assert [each["line"] for each in outcome.documents] == ["", odd, odd]
+    assert outcome.documents[1]["data"] == "\x9b2J"
+    assert all(line.isprintable() for line in outcome.out.split("\n"))
+
+
+def test_a_session_that_goes_on_in_another_file_goes_on_in_its_own_time(compax: Commands, tmp_path: Path) -> None:
+    path = write(tmp_path / "t", [(0.0, "x", LineMade()), (3600.0, "x", Opened())])
+    path.rename(tmp_path / "t.1")
+    rewritten(
+        write(path, [(0.0, "x", LineMade(is_open=True)), (3601.0, "x", Received(b"1"))]),
+        lambda entries: entries[0].update(part=2),
+    )
+    begun_at = compax.loop.time()
+    assert compax("replay", str(path), "--speed", "1", "--from", "3600").code == 0
+    assert compax.loop.time() - begun_at == 1
+    (tmp_path / "t.1").unlink()
+    begun_at = compax.loop.time()
+    assert compax("replay", str(path), "--speed", "1").code == 0
+    assert compax.loop.time() == begun_at
+
+
+def test_a_session_that_is_not_there_is_told(compax: Commands, tmp_path: Path) -> None:
+    outcome = compax("replay", str(write(tmp_path / "t", [])), "--session", "2")
+    assert outcome.code == 2
+    assert "the trace has no session 2; it has 1" in outcome.told
+
+
+def test_what_never_ends_is_shown_in_little_memory(compax: Commands, tmp_path: Path) -> None:
+    steps: list[Fact] = []
+    for at in range(3000):
+        steps += [Asked(at, "S1", Lane.READ), Sent(b"a", None, Way.GOES_ON), Received(b"a")]
+    steps += [Noticed("Stray")] * 100
+    path = write(tmp_path / "t", [(0.0, "x", step) for step in steps])
+    rows = compax("replay", str(path)).out.splitlines()
+    assert max(map(len, rows)) < 1500
+    assert sum(row.count("stray") for row in rows) == 100
+    assert sum(row.count("a" * 500) for row in rows) >= 2

@@ -183,3 +183,14 @@ def test_info_of_an_empty_trace_says_so(compax: Commands, tmp_path: Path, conten
     outcome = compax("trace", "info", str(path))
     assert outcome.code == 0
     assert "nothing is recorded there" in outcome.told
+
+
+@pytest.mark.parametrize("settings", [{"answer_timeout_s": 10**400}, {"answer_timeout_s": "long"}, {"profile": 3}, []])
+@pytest.mark.parametrize("device", ["compax", "smc"])
+def test_settings_of_others_are_refused_or_left_alone(
+    compax: Commands, tmp_path: Path, device: str, settings: object
+) -> None:
+    path = write(tmp_path / "t", [(0.0, "x", LineMade(device, about={"mode": "party", "settings": settings}))])
+    outcome = compax("trace", "check", str(path))
+    assert outcome.code in {0, 2}
+    assert "defect" not in outcome.told

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from rich.text import Text
 
-from ..escaping import escaped
+from ..escaping import escaped, shown
 from ..link.contract import Lane
 from ..link.taps import (
     Asked,
@@ -38,6 +38,11 @@ _WIDEST_DATA: Final = 36
 _WIDEST_NAME: Final = 12
 _NOTABLE_WAIT_S: Final = 0.001
 _LONG_GAP_S: Final = 1.0
+_LONGEST_ROW: Final = 1000
+"""Characters of what goes out piece by piece, before a new row begins."""
+_MOST_REMARKS: Final = 20
+_MOST_ASKED: Final = 1000
+"""So many that nobody has been answered are remembered; no line has as many waiting."""
 
 HEADING: Final = f"{'time':>12}  {'after':>9}  {'line':<{_WIDEST_NAME}}    what went over it"
 
@@ -109,7 +114,8 @@ class Rows:
         if isinstance(fact, Received) and row.echo is None and fact.data == row.piece:
             row.echo = _Row(entry.at, entry.line, "←", _shown(fact.data), "green")
             return True
-        if isinstance(fact, Sent) and fact.way is Way.GOES_ON and row.echo is not None and not row.echo.remarks:
+        is_next = row.echo is not None and not row.echo.remarks and len(row.text) < _LONGEST_ROW
+        if isinstance(fact, Sent) and fact.way is Way.GOES_ON and is_next:
             row.text, row.piece, row.echo = row.text + _shown(fact.data), fact.data, None
             return True
         return False
@@ -127,7 +133,7 @@ class Rows:
             case Received(data=data):
                 return _Row(at, line, "←", _shown(data), "green")
             case Asked(lane=Lane.STOP, text=text, number=number):
-                self._asked[line, number] = at, text
+                self._remember(entry, number, text)
                 return _Row(at, line, "!", f"{escaped(text)} is asked for", "bold")
             case SessionBegun():
                 self._before = None
@@ -146,7 +152,7 @@ class Rows:
         """Say what was noticed or told: in the row that waits if it is of the same moment and line, else in its own."""
         match entry.fact:
             case Asked(number=number, text=text):
-                self._asked[entry.line, number] = entry.at, text
+                self._remember(entry, number, text)
                 return
             case Noticed(event=event, details=details):
                 remark = _event(event, details or {})
@@ -158,10 +164,16 @@ class Rows:
             case _:
                 return
         row = self._row.echo or self._row if self._row is not None else None
-        if row is None or row.line != entry.line or entry.at - row.at > _NOTABLE_WAIT_S:
+        is_full = row is not None and len(row.remarks) >= _MOST_REMARKS
+        if row is None or row.line != entry.line or is_full or entry.at - row.at > _NOTABLE_WAIT_S:
             yield from self.end()
             row = self._row = _Row(entry.at, entry.line, " ", "", "")
         row.remarks.append(remark)
+
+    def _remember(self, entry: TraceEntry, number: int, text: str) -> None:
+        self._asked[entry.line, number] = entry.at, text
+        if len(self._asked) > _MOST_ASKED:
+            del self._asked[next(iter(self._asked))]
 
     def _written(self, row: _Row) -> Text:
         after = "" if self._before is None else f"+{_duration(row.at - self._before)}"
@@ -224,13 +236,18 @@ def _event(event: str, details: Any) -> tuple[str, str]:
     """Say an event in words, with what is not seen from the bytes."""
     words = _words(event)
     if event == "Rejected":
-        words += f", E{details.get('code')}"
+        words += f", E{_told(details.get('code'))}"
     elif event == "LateEnding":
-        words = f"late: answers {escaped(str(details.get('sent')))!r}, whose time was over"
+        words = f"late: answers {_told(details.get('sent'))!r}, whose time was over"
     elif event == "ComparatorReached":
-        words += f" {details.get('number')}"
+        words += f" {_told(details.get('number'))}"
     style = "red" if event in _TROUBLE else "green" if event == "PositionReached" else "dim"
     return words, style
+
+
+def _told(detail: Any) -> str:
+    """Write what should be a number or a text, whatever it is."""
+    return detail if isinstance(detail, str) and detail.isprintable() else shown(detail)
 
 
 def _ending(asked: str, how: str, answer: str | None) -> tuple[str, str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -22,6 +23,7 @@ from .exit_codes import exit_code_of
 
 __all__ = ["Printing", "as_json", "notes_console", "results_console", "tell_error", "tell_warning"]
 
+_NOT_PRINTED: Final = re.compile(r"[\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 _NARROWEST: Final = 40
 """Columns; a terminal that is narrower breaks lines itself."""
 
@@ -123,7 +125,9 @@ def _told(error: BaseException) -> str:
 def _document(told: Any, stream: TextIO) -> str:
     """Write one line of JSON that *stream* can take, whatever characters it knows."""
     knows_all = (getattr(stream, "encoding", None) or "").lower().startswith("utf")
-    return json.dumps(told, ensure_ascii=not knows_all)
+    document = json.dumps(told, ensure_ascii=not knows_all)
+    # What JSON may hold and a terminal would heed (0x9b is an escape sequence), and what is no character at all.
+    return _NOT_PRINTED.sub(lambda found: f"\\u{ord(found[0]):04x}", document)
 
 
 def _error_document(error: BaseException) -> dict[str, Any]:

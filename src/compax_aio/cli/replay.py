@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 from cyclopts import Parameter, validators
 from rich.console import Console
@@ -14,6 +14,7 @@ from rich.text import Text
 
 from compax_aio import InvalidCommandError
 
+from ..escaping import shown
 from ..recording.trace_entries import Cut, LineMade, Missing, SessionBegun, TraceEntry
 from ..recording.trace_reading import read_trace
 from .conversing import HEADING, Rows
@@ -23,6 +24,8 @@ from .number_words import NUMBER, WHOLE
 from .printing import Printing, results_console
 
 __all__ = ["Trace", "replay"]
+
+_NAMES_SHOWN: Final = 20
 
 Trace = Annotated[
     Path, Parameter(name="TRACE", help="Trace, as --trace of other commands and record_trace() write it.")
@@ -71,18 +74,27 @@ async def replay(
     """
     if from_ is not None and until is not None and until < from_:
         raise InvalidCommandError(f"--until {until:g} is before --from {from_:g}")
-    names: set[str] = set()
-    entries = _wanted(trace, _Part(set(line), session, from_, until), names)
+    part = _Part(set(line), session, from_, until)
+    entries = _wanted(trace, part)
     if printing.json:
         async for entry in _in_time(entries, speed):
             printing.show(_document(entry))
     else:
         await _show(entries, speed)
-    if missing := set(line) - names:
+    if session is not None and session > part.sessions:
+        raise InvalidCommandError(
+            f"the trace has no session {session}",
+            hint=f"it has {part.sessions or 'none'}; `compax trace info` says more",
+        )
+    if missing := part.lines - part.names:
         raise InvalidCommandError(
             f"the trace has no line {', '.join(map(repr, sorted(missing)))}",
-            hint=f"it has {', '.join(map(repr, sorted(names))) or 'none'}; `compax trace info` says more",
+            hint=f"it has {_some(part.names) or 'none'}; `compax trace info` says more",
         )
+
+
+def _some(names: set[str]) -> str:
+    return ", ".join(map(shown, sorted(names)[:_NAMES_SHOWN])) + (" …" if len(names) > _NAMES_SHOWN else "")
 
 
 def _entries(trace: Path) -> Iterator[TraceEntry]:
@@ -90,14 +102,16 @@ def _entries(trace: Path) -> Iterator[TraceEntry]:
         yield from read_trace(trace)
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Part:
-    """What of a trace is to be shown."""
+    """What of a trace is to be shown, and what there is of that kind."""
 
     lines: set[str]
     session: int | None
     begin: float | None
     until: float | None
+    names: set[str] = field(default_factory=set)
+    sessions: int = 0
 
     def has(self, entry: TraceEntry) -> bool:
         if self.session not in {None, entry.session} or (self.lines and entry.line and entry.line not in self.lines):
@@ -107,11 +121,12 @@ class _Part:
         return (self.begin is None or entry.at >= self.begin) and (self.until is None or entry.at <= self.until)
 
 
-def _wanted(trace: Path, part: _Part, names: set[str]) -> Iterator[TraceEntry]:
-    """Give the entries that are to be shown, and note the names of all lines in *names*."""
+def _wanted(trace: Path, part: _Part) -> Iterator[TraceEntry]:
+    """Give the entries that are to be shown, and note in *part* which lines and sessions there are."""
     for entry in _entries(trace):
+        part.sessions = entry.session
         if isinstance(entry.fact, LineMade):
-            names.add(entry.line)
+            part.names.add(entry.line)
         if part.has(entry):
             yield entry
 
@@ -120,9 +135,14 @@ async def _in_time(entries: Iterator[TraceEntry], speed: float | None) -> Any:
     """Give the entries, and wait between them as long as it took, if that is wanted."""
     loop = asyncio.get_running_loop()
     origin: float | None = None
+    session, goes_on = 0, False
     for number, entry in enumerate(entries):
+        if entry.session != session:
+            session, origin = entry.session, None
         if isinstance(entry.fact, SessionBegun):
-            origin = None
+            goes_on = entry.fact.part > 1
+        elif isinstance(entry.fact, Cut) or (goes_on and isinstance(entry.fact, LineMade) and not entry.at):
+            pass  # where a session goes on in another file its lines are told again, without their time
         elif speed is not None:
             if origin is None:
                 origin = loop.time() - entry.at / speed

@@ -233,14 +233,16 @@ def check(
     compax trace check run.jsonl --line x --json
     ```
     """
+    verdicts: list[Verdict] = []
     with reading(trace):
-        found = [each for each in conversations(trace) if _is_wanted(each, line, session)]
-    if not found:
+        for each in conversations(trace):  # one after the other: a trace may be larger than what fits in memory
+            if _is_wanted(each, line, session):
+                verdicts += _verdicts(each)
+    if not verdicts:
         raise InvalidCommandError(
             "there is no such line in the trace" if line or session else "there is no line in the trace",
             hint="`compax trace info` says what is in it",
         )
-    verdicts = [verdict for each in found for verdict in _verdicts(each)]
     printing.show(verdicts, Group(*_for_people(verdicts)))
     return _BROKEN if any(each.findings for each in verdicts) else 0
 

@@ -10,6 +10,7 @@ from dataclasses import fields, replace
 from typing import Any, Final
 
 from compax_aio.errors import InvalidCommandError
+from compax_aio.escaping import shown
 from compax_aio.link.contract import Lane
 from compax_aio.recording import Conversation
 from compax_aio.smc.facts import MAX_COMMAND_LENGTH
@@ -54,7 +55,7 @@ class _PartyLine:
         self.line = RecordedLine(conversation)
         self.mode = conversation.about.get("mode")
         if self.mode not in _MODES:
-            raise InvalidCommandError(f"the mode of a line is one of {', '.join(_MODES)}, not {self.mode!r}")
+            raise InvalidCommandError(f"the mode of a line is one of {', '.join(_MODES)}, not {shown(self.mode)}")
         self.settings = _settings(conversation.about)
         self.spoken = Spoken(self.line.wire, self.settings, self.mode, slack_s=SLACK_S)
         self.by_index = {each.index: each for each in self.spoken.lines}
@@ -164,7 +165,10 @@ def _settings(about: Mapping[str, Any]) -> SmcSettings:
     if not isinstance(table, dict):
         raise InvalidCommandError("the settings in the trace are no table")
     known = {each.name for each in fields(SmcSettings)} - {"profile"}
-    settings = SmcSettings(**{name: value for name, value in table.items() if name in known})
+    try:
+        settings = SmcSettings(**{name: value for name, value in table.items() if name in known})
+    except OverflowError:
+        raise InvalidCommandError("a setting in the trace is larger than any number can be meant") from None
     profile = table.get("profile", {})
     reset_time_s = profile.get("reset_time_s") if isinstance(profile, dict) else None
     if reset_time_s is None:
