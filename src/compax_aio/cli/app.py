@@ -56,6 +56,7 @@ _COMMANDS: Final = (
     (_SIMULATE, "sim", "sim:app", "Serve simulated devices on pseudo-terminals or TCP."),
     (_SIMULATE, "demo", "demo:demo", "Home and move three simulated drives at once."),
     (_MORE, "smc", "smc:app", "AMS SMC steppers: scan, status, move, stop, programs."),
+    (_MORE, "camm1", "camm1:app", "Roland CAMM-1 cutters: cut, check, preview, info."),
 )
 
 _ROOM: Final = "compax_aio.cli"

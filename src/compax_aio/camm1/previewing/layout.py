@@ -41,7 +41,7 @@ _LETTERS_ALONG: Final = 80
 _LETTER_WIDTH: Final = 0.52
 """Of its size, on the average."""
 _LEAST_WIDTH_LETTERS: Final = 62
-_MOST_NUMBERS: Final = 60
+_MOST_NUMBERS: Final = 30
 """Cuts that are numbered: more of them are shown by their colour alone."""
 _MOST_DASHED: Final = 400
 """Ways with the tool up that are dashed; more of them are solid, thinner and fainter, so that cuts are seen."""
@@ -115,7 +115,7 @@ class _Page:
         width_mm, height_mm = area.width_steps * mm_per_step, area.height_steps * mm_per_step
         self._area = area
         self._letter = max(_LEAST_LETTER_MM, hypot(width_mm, height_mm) / _LETTERS_ALONG)
-        self._line_mm = self._letter / 11
+        self._line_mm = self._letter / 13
         self._margin = 5.5 * self._letter
         self._width_mm = max(width_mm + 2 * self._margin, _LEAST_WIDTH_LETTERS * self._letter)
         self._left = (self._width_mm - width_mm) / 2
@@ -222,7 +222,7 @@ class _Page:
             at = (x + 0.3 * self._letter, y - 0.3 * self._letter)
             if all(hypot(at[0] - other[0], at[1] - other[1]) > 1.5 * self._letter for other in taken):
                 taken.append(at)
-                self._add(Words(at, str(number), 0.9 * self._letter, _INK, halo=True))
+                self._add(Words(at, str(number), 0.8 * self._letter, _INK, halo=True))
 
     # Beside it --------------------------------------------------------------------------------------------------------
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import secrets
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from ...errors import InvalidCommandError
+from ...severity import Severity
 from ...text_file import name_of, replace_file
 from ..profiles import PNC_1610, Profile
 from .drawing import Bounds, Drawing
@@ -20,9 +21,10 @@ from .tool_path import drawing_of
 if TYPE_CHECKING:
     from os import PathLike
 
+    from ..checking import Problem, Sheet
     from ..language.job import Job
 
-__all__ = ["FORMS", "draw", "preview", "subtitles_of"]
+__all__ = ["FORMS", "preview", "written_length"]
 
 FORMS: Final = (".svg", ".png")
 _METRE_MM: Final = 1000.0
@@ -33,8 +35,8 @@ def preview(
     path: str | PathLike[str],
     *,
     profile: Profile = PNC_1610,
-    sheet_mm: tuple[float, float] | None = None,
-    flaws: Iterable[Flaw] = (),
+    sheet: Sheet | None = None,
+    problems: Iterable[Problem] = (),
     title: str = "",
 ) -> Drawing:
     """
@@ -48,8 +50,8 @@ def preview(
         job: As :func:`compax_aio.camm1.parse` gives it.
         path: Of the file; one that is there is replaced.
         profile: The machine, for the size of its steps.
-        sheet_mm: Width and height of the sheet that lies in it, with the origin at its left bottom; outlined.
-        flaws: What is wrong with the job; marked.
+        sheet: What lies in it; outlined.
+        problems: What :func:`compax_aio.camm1.check` has found; marked where it is, and told below.
         title: In the first line; empty: none.
 
     Returns:
@@ -64,7 +66,15 @@ def preview(
     if form not in FORMS:
         raise InvalidCommandError(f"the name of a preview ends in {', '.join(FORMS)}, not as {name_of(path)}")
     drawing = drawing_of(job.instructions)
-    scene = draw(drawing, profile=profile, sheet_mm=sheet_mm, flaws=tuple(flaws), title=title)
+    per_mm = profile.steps_per_mm
+    scene = scene_of(
+        drawing,
+        mm_per_step=1 / per_mm,
+        title=title,
+        subtitles=_subtitles(drawing, profile),
+        sheet=None if sheet is None else Bounds(0, 0, sheet.x_mm * per_mm, sheet.y_mm * per_mm),
+        flaws=[_flaw(each) for each in problems],
+    )
     if form == ".svg":
         replace_file(path, svg_of(scene))
     else:
@@ -72,34 +82,20 @@ def preview(
     return drawing
 
 
-def draw(
-    drawing: Drawing,
-    *,
-    profile: Profile = PNC_1610,
-    sheet_mm: tuple[float, float] | None = None,
-    flaws: Sequence[Flaw] = (),
-    title: str = "",
-) -> Scene:
-    """Lay *drawing* out as :func:`preview` does."""
-    sheet = None
-    if sheet_mm is not None:
-        width_mm, height_mm = sheet_mm
-        sheet = Bounds(0, 0, width_mm * profile.steps_per_mm, height_mm * profile.steps_per_mm)
-    subtitles = subtitles_of(drawing, profile)
-    return scene_of(
-        drawing, mm_per_step=1 / profile.steps_per_mm, title=title, subtitles=subtitles, sheet=sheet, flaws=flaws
-    )
+def _flaw(problem: Problem) -> Flaw:
+    where = f"{problem.line}:{problem.column}"
+    return Flaw(problem.what, problem.offset, where, is_error=problem.severity is Severity.ERROR)
 
 
-def subtitles_of(drawing: Drawing, profile: Profile) -> list[str]:
+def _subtitles(drawing: Drawing, profile: Profile) -> list[str]:
     """Say in words how much is cut, and where."""
     mm = 1 / profile.steps_per_mm
     bounds = drawing.cut_bounds
     if bounds is None:
-        return [f"nothing is cut; travel {_length(drawing.travel_steps * mm)}"]
+        return [f"nothing is cut; travel {written_length(drawing.travel_steps * mm)}"]
     count = "1 cut" if drawing.cuts == 1 else f"{drawing.cuts:,} cuts"
     return [
-        f"{count}, {_length(drawing.cut_steps * mm)}; travel {_length(drawing.travel_steps * mm)}",
+        f"{count}, {written_length(drawing.cut_steps * mm)}; travel {written_length(drawing.travel_steps * mm)}",
         f"from {_point(bounds.left * mm, bounds.bottom * mm)} to {_point(bounds.right * mm, bounds.top * mm)} mm",
     ]
 
@@ -108,7 +104,8 @@ def _point(x_mm: float, y_mm: float) -> str:
     return f"({x_mm:.2f}, {y_mm:.2f})"
 
 
-def _length(length_mm: float) -> str:
+def written_length(length_mm: float) -> str:
+    """Write a length as people do."""
     return f"{length_mm:.1f} mm" if length_mm < _METRE_MM else f"{length_mm / _METRE_MM:,.2f} m"
 
 
