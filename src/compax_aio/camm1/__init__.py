@@ -76,7 +76,7 @@ _HOMES: Final[dict[str, tuple[str, ...]]] = {
     ),
     ".vocabulary": ("JobSettings",),
 }  # fmt: skip
-"""Where each name is, never in a module of that name; whoever adds a module adds its names here, in __all__, and above."""
+"""Where each name is, never in a module of that name; new names go here, in __all__, and above."""
 
 
 def __getattr__(name: str) -> Any:

@@ -163,7 +163,7 @@ class Checker:
                 "it is taken out before the job is sent: the sender alone says such things",
             )
             remains = stripped(instruction)
-            if remains is None:
+            if remains is None or remains.language is Language.BLANK:
                 return
             instruction = remains
         row = self._row(instruction)

@@ -32,8 +32,8 @@ def _read_slowly(text: bytes) -> list[float]:
         try:
             values.append(float(each))
         except ValueError:
-            text = each.decode("latin-1")
-            raise ValueError(f"{text!r} is no number" if text else "a number is missing beside a comma") from None
+            told = each.decode("latin-1")
+            raise ValueError(f"{told!r} is no number" if told else "a number is missing beside a comma") from None
     return values
 
 

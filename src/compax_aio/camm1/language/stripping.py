@@ -24,11 +24,12 @@ def stripped(instruction: Instruction) -> Instruction | None:
     """
     Return the instruction without the device control within it; None if nothing of it may go to the cutter.
 
+    Of an instruction that is left out, the blanks that stand in front of it stay, as an instruction of blanks.
     The machine takes device control out of what it receives wherever it stands; what is left is what it would have
     cut. Offset, line and column stay.
     """
     if instruction.language is Language.CONTROL or is_output(instruction):
-        return None
+        return _blanks_in_front(instruction)
     if not instruction.holds_control:
         return instruction
     front, arguments, end = (
@@ -41,3 +42,11 @@ def stripped(instruction: Instruction) -> Instruction | None:
     )
     first = len(front)
     return instruction._replace(data=front + arguments + end, first=first, last=first + len(arguments))
+
+
+def _blanks_in_front(instruction: Instruction) -> Instruction | None:
+    size = instruction.begin
+    if not size:
+        return None
+    blanks = instruction.data[:size]
+    return instruction._replace(data=blanks, name="", language=Language.BLANK, begin=0, first=size, last=size)

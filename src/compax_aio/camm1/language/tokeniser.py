@@ -26,6 +26,7 @@ _LINE_END: Final = re.compile(rb"\r\n|\r|\n")
 _END_OF_NUMBERS: Final = re.compile(rb"[A-Za-z;!^\x1b]")
 _END_OF_NUMBERS_OR_LINE: Final = re.compile(rb"[A-Za-z;!^\x1b\r\n]")
 _END_OF_LINE: Final = re.compile(rb"[\r\n]")
+_BEHIND_A_NAME: Final = frozenset([b"", *(bytes([sign]) for sign in b"0123456789+-.,; \t\r\n")])
 _PARAMETERS: Final = re.compile(rb"[0-9; ]{0,%d}" % _LONGEST_BLANK)
 
 # Nearly all of nearly every job is of these two forms; whatever else there is takes the way of _read_head().
@@ -77,7 +78,8 @@ class Tokeniser:
     Takes a job in pieces of any size and gives whole instructions; how it was cut into pieces changes nothing.
 
     Two letters that mode 2 has as a name are of mode 2, wherever they stand: letters of mode 1 have no letter behind
-    them, but for ``P``, which prints what stands behind it and is taken so right behind other instructions of mode 1.
+    them, but for ``P``, which prints what stands behind it. It is taken so right behind other instructions of mode 1,
+    unless what it would print looks like ``PU;`` or ``PA1,2``: how a machine tells these is on no page at hand.
     An instruction of mode 2 ends with ``;`` or where the next one begins; one of mode 1, a common one, and one that
     mode 1 calls with ``^``, at the end of the line too.
 
@@ -215,32 +217,32 @@ class Tokeniser:
 
     def _read_head(self, begin: int, *, is_end: bool) -> _Head | None:
         """Say what begins at *begin*; None if more must come to say it."""
-        held, at = self._held, self._at
-        sign = chr(held[begin])
-        where = begin - at
+        held = self._held
+        sign, where = chr(held[begin]), begin - self._at
         if held[begin] == ESCAPE:
             return self._read_control(begin, is_end=is_end)
-        marks = 1 if sign in "!^" else 0
-        letters = bytes(held[begin + marks : begin + marks + 2]).decode("latin-1")
-        if len(letters) < 2 and not is_end and (sign in "!^" or (sign.isascii() and sign.isalpha())):
+        is_letter = sign.isascii() and sign.isalpha()
+        needed = 3 if sign in "Pp" and self._in_mode_1 else 2
+        if (is_letter or sign in "!^") and len(held) < begin + needed and not is_end:
             return None
-        pair = letters.upper() if len(letters) == 2 and letters.isascii() and letters.isalpha() else ""
-        if sign == "^" and pair:
-            row = MODE_2.get(pair)
-            shape = row.shape if row else Shape.NUMBERS
-            return _Head(pair, Language.TWO, shape, where, where + 3, where + 3, ends_with_line=True)
-        if sign == "!" and pair:
-            return _Head(
-                f"!{pair}", Language.COMMON, Shape.NUMBERS, where, where + 3, where + 3, ends_with_line=True
-            )  # fmt: skip
-        if sign.isascii() and sign.isalpha():
-            return self._read_letters(sign.upper(), pair, where)
+        marks = 0 if is_letter else 1
+        letters = bytes(held[begin + marks : begin + marks + 2])
+        pair = letters.decode().upper() if len(letters) == 2 and letters.isalpha() else ""
+        if is_letter:
+            return self._read_letters(sign.upper(), pair, where, bytes(held[begin + 2 : begin + 3]))
+        if sign in "!^" and pair:
+            row, first = MODE_2.get(pair), where + 3
+            shape = row.shape if row and sign == "^" else Shape.NUMBERS
+            name, language = (pair, Language.TWO) if sign == "^" else (f"!{pair}", Language.COMMON)
+            return _Head(name, language, shape, where, first, first, ends_with_line=True)
         return _Head("", Language.UNKNOWN, Shape.NUMBERS, where, where, where + 1, ends_with_line=self._in_mode_1)
 
-    def _read_letters(self, letter: str, pair: str, where: int) -> _Head:
+    def _read_letters(self, letter: str, pair: str, where: int, behind: bytes) -> _Head:
         """Tell a letter of mode 1 from a pair of mode 2."""
         single = MODE_1.get(letter)
         prints = letter == "P" and self._in_mode_1
+        if prints and self._language is None:
+            prints = not (pair in MODE_2 and behind in _BEHIND_A_NAME)
         if self._language is not Language.ONE and pair:
             row = MODE_2.get(pair)
             is_single = row is None and single is not None and (self._in_mode_1 or letter == "H")
