@@ -18,7 +18,8 @@ pairs = st.lists(st.tuples(st.integers(-999, 999), st.integers(-999, 999)), min_
 
 
 def followed(job: str) -> tuple[Tracker, list[Path]]:
-    tracker, paths = Tracker(), []
+    tracker = Tracker()
+    paths: list[Path] = []
     for each in parse(job, DXY_1300):
         path = tracker.follow(each)
         if path is not None:

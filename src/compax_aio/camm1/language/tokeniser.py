@@ -222,7 +222,7 @@ class Tokeniser:
         if held[begin] == ESCAPE:
             return self._read_control(begin, is_end=is_end)
         is_letter = sign.isascii() and sign.isalpha()
-        needed = 3 if sign in "Pp" and self._in_mode_1 else 2
+        needed = 3 if sign in "!^" or (sign in "Pp" and self._in_mode_1) else 2
         if (is_letter or sign in "!^") and len(held) < begin + needed and not is_end:
             return None
         marks = 0 if is_letter else 1
