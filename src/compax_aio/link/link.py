@@ -30,37 +30,6 @@ from .wire import WireHistory
 __all__ = ["Link", "LinkStats"]
 
 
-_SILENT_SHARE: Final = 1 / 2
-"""Of the time for which a lost line is waited for: so long a silence leaves some for a new attempt."""
-_SHORTEST_SILENCE_S: Final = 10.0
-"""A device that is busy, or whose only answer comes late, must not cost the connection."""
-
-
-class _End(asyncio.Protocol):
-    """One transport's hold on a link: what it says after its end, or after another one was taken, is not heard."""
-
-    def __init__(self, link: Link) -> None:
-        self._link: Link | None = link
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        if self._link is not None:
-            self._link.connection_made(transport)
-        else:
-            cast("asyncio.Transport", transport).abort()
-
-    def data_received(self, data: bytes) -> None:
-        if self._link is not None:
-            self._link.data_received(data)
-
-    def connection_lost(self, exc: Exception | None) -> None:
-        link, self._link = self._link, None
-        if link is not None:
-            link.connection_lost(exc)
-
-    def let_go(self) -> None:
-        self._link = None
-
-
 class Link(asyncio.Protocol):
     """
     Runs a device's protocol over a transport.
@@ -267,6 +236,20 @@ class Link(asyncio.Protocol):
     def is_free(self) -> bool:
         """Whether a line that is queued now would be written at once, unless it is a read that is held back."""
         return self.is_open and self._turns.is_free
+
+    @property
+    def unsent_bytes(self) -> int:
+        """How many bytes that were written have not left yet, as far as can be told."""
+        return self._port.unsent_bytes
+
+    @property
+    def bytes_per_s(self) -> float | None:
+        """How fast the line sends, where that is known; set it before it is asked what is unsent."""
+        return self._port.bytes_per_s
+
+    @bytes_per_s.setter
+    def bytes_per_s(self, value: float | None) -> None:
+        self._port.bytes_per_s = value
 
     @property
     def held(self) -> Hold | None:

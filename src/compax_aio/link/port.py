@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable
+from math import ceil
 from typing import Any, Final
 
 from .stats import LinkStats
@@ -25,6 +26,8 @@ _BETWEEN_PIECES_S: Final = 0.001
 """… and then not for so long: five times what comes at 115,200 baud, and others have the event loop meanwhile."""
 _MOST_UNSENT_BYTES: Final = 1024
 """More than that waits only on a line that takes nothing: one command is outstanding at a time."""
+_PART_OF_A_BYTE: Final = 1e-3
+"""Times are sums, and not exact: what is missing less than that has left."""
 
 
 class Port:
@@ -49,6 +52,10 @@ class Port:
         self._end: asyncio.Future[None] | None = None
         self.heard_at = 0.0
         """Loop time at which something came last, or the transport was taken."""
+        self.bytes_per_s: float | None = None
+        """How fast the line sends, where that is known."""
+        self._sent_at = 0.0
+        """Loop time at which all is on its way that was written, if the line sends as fast as that."""
 
     @property
     def is_there(self) -> bool:
@@ -59,7 +66,7 @@ class Port:
         """Take a transport."""
         self._transport = transport
         self._unread.clear()
-        self.heard_at = self._loop.time()
+        self.heard_at = self._sent_at = self._loop.time()
         self._end = self._loop.create_future()
         if self._tap is not None:
             self._tap(Opened())
@@ -72,6 +79,22 @@ class Port:
     def is_stuck(self) -> bool:
         """Whether the far end takes nothing, and more has been written than it will ever be well to send."""
         return self._transport is not None and self._transport.get_write_buffer_size() > _MOST_UNSENT_BYTES
+
+    @property
+    def unsent_bytes(self) -> int:
+        """
+        How many bytes that were written have not left yet, as far as can be told.
+
+        The transport and the driver of a serial port tell what waits with them; what waits behind them, in an adapter
+        or a terminal server, is reckoned from the time it takes at :attr:`bytes_per_s`.
+        """
+        if self._transport is None:
+            return 0
+        waiting = self._transport.get_write_buffer_size() + _unsent_by_driver(self._transport)
+        if self.bytes_per_s is None:
+            return waiting
+        reckoned = (self._sent_at - self._loop.time()) * self.bytes_per_s
+        return max(waiting, ceil(reckoned - _PART_OF_A_BYTE))
 
     def ended(self) -> None:
         """Take note that the transport has reported its end."""
@@ -87,6 +110,8 @@ class Port:
         self._history.sent(self._loop.time(), data, goes_on=goes_on)
         if _wire_log.isEnabledFor(logging.DEBUG):
             _wire_log.debug("%s → %s", self._name, readable(data))
+        if self.bytes_per_s is not None:
+            self._sent_at = max(self._sent_at, self._loop.time()) + len(data) / self.bytes_per_s
         self._transport.write(data)
 
     def received(self, data: bytes) -> None:
@@ -161,6 +186,15 @@ class Port:
     def _tell_let_go(self, transport: asyncio.Transport) -> None:
         if self._tap is not None and not transport.is_closing():
             self._tap(LetGo())
+
+
+def _unsent_by_driver(transport: asyncio.Transport) -> int:
+    """Return what the driver of a serial port has not sent; 0 where it is none, or does not say."""
+    driver = transport.get_extra_info("serial")
+    try:
+        return int(getattr(driver, "out_waiting", 0))
+    except (OSError, ValueError):  # it went away, which the transport tells soon
+        return 0
 
 
 def _abort_unless_ended(transport: asyncio.Transport, end: asyncio.Future[None]) -> None:

@@ -1,0 +1,222 @@
+"""What the machine says while a job is under way: whether it is paused, whether it still takes data, its errors."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from typing import Final, TypeVar
+
+from ..errors import AnswerTimeoutError, ConnectionLostError, UnexpectedAnswerError
+from ..link.contract import Lane
+from ..motion.events import DriveEvent
+from .cut import CutAccount, CutState
+from .events import CutterError, CutterPaused, CutterResumed
+from .facts.reports import IO_ERRORS
+from .line import CutterLine, meaning_of
+from .replies import CutterStatus
+from .reports import CutReports
+
+__all__ = ["MachineWatch"]
+
+_T = TypeVar("_T")
+
+_LOOK_AFTER_S: Final = 1.0
+"""A cutter that takes nothing for so long is asked whether it is paused, and again after as long."""
+_PAUSED_POLL_S: Final = 0.1
+_AGAIN_S: Final = 0.1
+_FEW_BYTES: Final = 48
+"""A few short instructions; they may be taken between two looks at a machine that goes on after a pause."""
+
+
+class MachineWatch:
+    """
+    Looks after the machine for one job.
+
+    Args:
+        line: Of the cutter.
+        reports: Write the errors.
+        account: Says what is known of the job.
+        publish: Is told what happens.
+        set_state: Is told what the job does.
+        check: Raises if the job shall not go on.
+
+    Attributes:
+        capacity_bytes: Of the buffer.
+        wake: Set it to have whoever waits look whether the job shall go on.
+        warnings: What was told that ruins nothing.
+    """
+
+    def __init__(
+        self,
+        line: CutterLine,
+        reports: CutReports,
+        *,
+        account: Callable[[], CutAccount],
+        publish: Callable[[DriveEvent], None],
+        set_state: Callable[[CutState], None],
+        check: Callable[[], None],
+    ) -> None:
+        self.capacity_bytes = 0
+        self.wake = asyncio.Event()
+        self.warnings: list[str] = []
+        self._line = line
+        self._settings = line.settings
+        self._reports = reports
+        self._account = account
+        self._publish = publish
+        self._set_state = set_state
+        self._check = check
+        self._loop = asyncio.get_running_loop()
+        self._seen: object = None
+        self._changed_at = self._looked_at = self._loop.time()
+        self._poll_s = self._settings.poll_first_s
+
+    # Time -----------------------------------------------------------------------------------------------------------
+
+    async def pause(self, seconds: float) -> None:
+        """Wait, but not when the job shall not go on."""
+        self.wake.clear()
+        self._check()
+        try:
+            async with asyncio.timeout(seconds):
+                await self.wake.wait()
+        except TimeoutError:
+            pass
+        self._check()
+
+    def note(self, seen: object) -> None:
+        """Take note of what changes as long as the cutter takes data."""
+        if seen != self._seen:
+            self._seen = seen
+            self.restart()
+
+    def restart(self) -> None:
+        """Count anew for how long the cutter takes nothing."""
+        self._changed_at = self._looked_at = self._loop.time()
+        self._poll_s = self._settings.poll_first_s
+
+    @property
+    def flat_s(self) -> float:
+        """For how long nothing has changed."""
+        return self._loop.time() - self._changed_at
+
+    # Asking ---------------------------------------------------------------------------------------------------------
+
+    async def ask(self, question: Callable[[], Awaitable[_T]]) -> _T:
+        """
+        Ask until it is answered, as long as a stalled cutter is waited for.
+
+        Raises:
+            MoveInDoubtError: The line is lost, or the cutter says nothing any more.
+        """
+        give_up_at = self._loop.time() + self._settings.stall_timeout_s
+        while True:
+            try:
+                answer = await question()
+            except (AnswerTimeoutError, UnexpectedAnswerError) as error:
+                self._check()
+                if self._loop.time() >= give_up_at:
+                    raise self._reports.lost(error, self._account()) from error
+            except ConnectionLostError as error:
+                self._check()
+                raise self._reports.lost(error, self._account()) from error
+            else:
+                self._check()
+                return answer
+            await self.pause(_AGAIN_S)
+
+    async def status(self) -> CutterStatus:
+        """Read the status."""
+        return await self.ask(lambda: self._line.status(Lane.CONTROL))
+
+    async def free_space(self) -> int:
+        """Read the free space."""
+        return await self.ask(lambda: self._line.free_space(Lane.CONTROL))
+
+    # Waiting for the machine ----------------------------------------------------------------------------------------
+
+    async def wait_for_room(self) -> None:
+        """
+        Wait a while, the longer the longer nothing has changed; find out why if that is long.
+
+        Raises:
+            MoveTimeoutError: For too long.
+            MoveStoppedError: The operator has ended the job.
+        """
+        await self.pause(self._poll_s)
+        self._poll_s = min(2 * self._poll_s, self._settings.poll_slowest_s)
+        if self._loop.time() - self._looked_at >= _LOOK_AFTER_S:
+            await self._look_why()
+
+    async def _look_why(self) -> None:
+        status = await self.status()
+        self._looked_at = self._loop.time()
+        if _is_held(status):
+            await self._until_resumed()
+        elif self.flat_s >= self._settings.stall_timeout_s:
+            raise self._reports.stalled(self.flat_s, self._account(), is_held=False)
+
+    async def until_empty(self) -> None:
+        """
+        Wait until the buffer is empty and nobody holds the machine.
+
+        Raises:
+            MoveTimeoutError: It takes nothing for too long.
+            MoveStoppedError: The operator has ended the job.
+        """
+        self.restart()
+        while True:
+            status = await self.status()
+            if _is_held(status):
+                await self._until_resumed()
+                continue
+            if status.buffer_is_empty:
+                return
+            self.note(await self.free_space())
+            if self.flat_s >= self._settings.stall_timeout_s:
+                raise self._reports.stalled(self.flat_s, self._account(), is_held=False)
+            await self.pause(self._poll_s)
+            self._poll_s = min(2 * self._poll_s, self._settings.poll_slowest_s)
+
+    async def _until_resumed(self) -> None:
+        """
+        Wait as long as the operator wants, and see what he does.
+
+        A paused machine takes nothing. If space becomes free all the same, or the buffer is empty the moment it goes
+        on, its data was deleted: so PAUSE and SETUP end a job (PNC-900 p. 10).
+        """
+        self._set_state("operator pause")
+        self._publish(CutterPaused(self._line.name, self._loop.time()))
+        free = await self.free_space()
+        while True:
+            await self.pause(_PAUSED_POLL_S)
+            status, now_free = await self.status(), await self.free_space()
+            if _is_held(status) and now_free <= free:
+                continue
+            stored = self.capacity_bytes - free
+            is_deleted = now_free > free if _is_held(status) else status.buffer_is_empty and stored > _FEW_BYTES
+            if is_deleted:
+                raise self._reports.cancelled_at_machine(self._account())
+            break
+        self._publish(CutterResumed(self._line.name, self._loop.time()))
+        self.restart()
+
+    # Errors ---------------------------------------------------------------------------------------------------------
+
+    async def look_for_errors(self) -> None:
+        """
+        Read the errors of the line (``.E``).
+
+        Raises:
+            DriveFaultError: One of them ruins the job.
+        """
+        for code in await self.ask(lambda: self._line.errors(Lane.CONTROL)):
+            error = IO_ERRORS.get(code)
+            self._publish(CutterError(self._line.name, self._loop.time(), code, meaning_of(code), "ESC.E"))
+            if error is None or error.ruins_job:
+                raise self._reports.faulty(code, self._account())
+            self.warnings.append(f"the cutter has told {meaning_of(code)}")
+
+
+def _is_held(status: CutterStatus) -> bool:
+    return status.is_paused or bool(status.is_suspended)
