@@ -315,6 +315,89 @@ async def test_leaving_stops_what_is_in_doubt() -> None:
     assert drive_named("x").log.texts(LogKind.MOTION_STOPPED)
 
 
+@asynccontextmanager
+async def lost_on_its_way() -> AsyncIterator[tuple[Cell, Cable, SimulatedDrive]]:
+    """Jog an axis whose line is lost for good meanwhile: it goes on, and nobody sees it."""
+    cable, far = Cable(), SimulatedDrive(Knobs(homed=True), name="x")
+    await cable.plug(far)
+    cell = cell_of({"x": cable.url}, DriveSettings(reconnect=False, stop_timeout_s=2))
+    cell.start()
+    x = cell.axes[0]
+    await until(lambda: state_of(x) == "STANDING")
+    x.orders.jog(5000)
+    await until(lambda: state_of(x) == "MOVING")
+    await cable.pull()
+    await until(lambda: x.state.phase is Phase.ENDED)
+    assert [axis.name for axis in cell.moved_from_here] == ["x"]
+    yield cell, cable, far
+    await cell.close()
+
+
+async def test_an_axis_whose_line_was_lost_for_good_is_not_said_to_stand() -> None:
+    async with lost_on_its_way() as (cell, _, far):
+        await cell.close()
+        assert cell.farewells[0].text.startswith("NOT KNOWN TO STAND, use the emergency stop if it moves")
+        assert cell.farewells[0].error is not None
+        assert far.moving
+
+
+async def test_one_whose_line_is_not_there_again_is_not_said_to_stand() -> None:
+    async with lost_on_its_way() as (cell, _, far):
+        cell.axes[0].try_again()
+        await until(lambda: cell.axes[0].state.phase is Phase.UNREACHABLE)
+        await cell.close()
+        assert cell.farewells[0].text.startswith("NOT KNOWN TO STAND")
+        assert "there is no line to stop it" in cell.farewells[0].text
+        assert far.moving
+
+
+async def test_one_whose_line_was_opened_anew_is_in_doubt_still_and_stopped_when_it_is_left() -> None:
+    async with lost_on_its_way() as (cell, cable, far):
+        x = cell.axes[0]
+        await cable.plug(far)
+        x.try_again()
+        await until(lambda: state_of(x) == "IN DOUBT")
+        x.orders.jog(1)
+        assert "jog +1 units: nothing was sent, for what became of jog +5000 units is not known" in told(cell)
+        await cell.close()
+        assert cell.farewells[0].text == "something was in doubt: it was stopped, and stands"
+        assert not far.moving
+        await cable.pull()
+
+
+async def test_one_whose_line_was_opened_anew_moves_again_when_somebody_has_looked() -> None:
+    async with lost_on_its_way() as (cell, cable, far):
+        x = cell.axes[0]
+        await cable.plug(far)
+        x.try_again()
+        await until(lambda: state_of(x) == "IN DOUBT")
+        await until(lambda: not far.moving)
+        x.orders.reconcile()
+        await until(lambda: state_of(x) == "STANDING")
+        x.orders.jog(1)
+        await until(lambda: "jog +1 units: reached" in told(cell))
+        await cell.close()
+        assert cell.farewells[0].text == ""
+        await cable.pull()
+
+
+async def test_a_stop_that_waits_for_a_lost_line_is_not_said_to_be_sent() -> None:
+    cable, far = Cable(), SimulatedDrive(Knobs(homed=True), name="x")
+    await cable.plug(far)
+    async with watching({"x": cable.url}) as cell:
+        x = cell.axes[0]
+        await until(lambda: state_of(x) == "STANDING")
+        await cable.pull()
+        await until(lambda: x.state.phase is Phase.LOST)
+        x.orders.stop()
+        assert x.state.stop is not None
+        assert "it waits for it" in x.state.stop.text
+        assert "sent" not in x.state.stop.text
+        await cable.plug(far)
+        await until(lambda: "stop: acknowledged, and the axis stands" in told(cell))
+    await cable.pull()
+
+
 async def test_closing_is_carried_through_although_it_is_cancelled() -> None:
     cell = cell_of({"x": "sim://compax?name=x&homed=1"})
     cell.start()

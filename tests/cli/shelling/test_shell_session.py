@@ -244,6 +244,17 @@ async def test_a_move_in_doubt_may_still_be_moving() -> None:
         await person.sees("THE AXIS MAY STILL BE MOVING")
 
 
+async def test_a_move_whose_line_was_lost_for_good_may_still_be_moving() -> None:
+    cable = Cable()
+    async with sitting(cable=cable, settings=DriveSettings(reconnect=False), leaves=False, **SLOW) as person:
+        await person.say("move 50", "on its way")
+        await cable.pull()
+        await person.sees("LINE LOST")
+        await person.shows("may still be moving it")
+        person.press(CTRL_D)
+        await person.sees("THE AXIS MAY STILL BE MOVING: use the stop in hardware")
+
+
 async def test_after_doubt_reconcile_lets_it_move_again() -> None:
     cable = Cable()
     async with sitting(cable=cable, settings=DriveSettings(in_doubt_after_s=1), **SLOW) as person:

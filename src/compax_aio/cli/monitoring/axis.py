@@ -176,7 +176,7 @@ class MonitoredAxis:
     def _take_drive(self, drive: Drive) -> None:
         """Take down what is known of the drive without asking it."""
         state = self.state
-        state.doubt = _doubt_of(drive)
+        state.doubt = _doubt_of(drive) or self.orders.doubt
         state.unit, state.decimals = drive.settings.unit, drive.settings.decimals
         state.answer_time_s = drive.stats.answer_time_s(50)
 
@@ -184,7 +184,7 @@ class MonitoredAxis:
         """Take down what can be known without a word from the drive; to be called before it is shown."""
         if self.orders.drive is None:
             return
-        self.state.doubt = _doubt_of(self.orders.drive)
+        self.state.doubt = _doubt_of(self.orders.drive) or self.orders.doubt
         if self.state.phase is Phase.LOST:
             self.state.attempts = self.orders.drive.stats.openings - self._openings
 

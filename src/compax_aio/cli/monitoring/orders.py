@@ -10,6 +10,7 @@ from typing import Any
 from compax_aio import Drive, Move
 from compax_aio.errors import CompaxError, MoveInDoubtError, MoveStoppedError, MoveTimeoutError
 
+from ..in_doubt import may_go_on
 from .diary import Diary
 from .levels import Level
 from .state import AxisState, StopReport
@@ -52,13 +53,18 @@ class Orders:
         """By how much a jog moves that is not over."""
         self._stopping: asyncio.Task[None] | None = None
         self._tasks: set[asyncio.Task[None]] = set()
-        self._may_have_left_moving = False
+        self._in_doubt: str | None = None
         self._is_closed = False
 
     @property
     def may_move_by_us(self) -> bool:
         """Whether a motion was started here that is not known to be over, or a stop from here failed."""
-        return self._move is not None or self._may_have_left_moving
+        return self._move is not None or self._in_doubt is not None
+
+    @property
+    def doubt(self) -> str | None:
+        """What of here may still move the axis, also if its line was opened anew since; None: nothing."""
+        return self._in_doubt
 
     def _now(self) -> float:
         return asyncio.get_running_loop().time()
@@ -96,6 +102,8 @@ class Orders:
             self._tell(f"{what}: nothing was sent, a stop is under way", Level.ATTENTION)
         elif self._move is not None:
             self._tell(f"{what}: nothing was sent, {self._state.own_motion} is not over", Level.ATTENTION)
+        elif self._in_doubt is not None:
+            self._tell(f"{what}: nothing was sent, for {self._in_doubt}; look at it, then r", Level.ATTENTION)
         else:
             try:
                 move = start(drive)
@@ -116,8 +124,9 @@ class Orders:
             self._state.own_ended_at = self._now()
         error = None if move.cancelled() else move.exception()
         if error is not None:
-            is_in_doubt = isinstance(error, MoveInDoubtError)
-            self._may_have_left_moving |= is_in_doubt
+            is_in_doubt = may_go_on(move, line_is_there=self.drive is not None and self.drive.is_open)
+            if is_in_doubt:
+                self._in_doubt = f"what became of {what} is not known"
             self._tell(f"{what}: {self._plain(error)}", Level.ALARM if is_in_doubt else Level.ATTENTION)
         elif not move.cancelled():
             result, state = move.result(), self._state
@@ -138,20 +147,23 @@ class Orders:
             text = "STOP was not sent, there is no line: use the emergency stop if it moves"
             self._report_stop(Level.ALARM, text)
             return
-        self._state.stop = StopReport(self._now(), Level.WAITING, "STOP sent, waiting for the drive")
+        how = "waiting for the drive to acknowledge it"
+        if not self.drive.is_open:
+            how = "the line is lost, so it waits for it: use the emergency stop if it moves"
+        self._state.stop = StopReport(self._now(), Level.WAITING, how)
         self._stopping = self._spawn(self._carry_stop_through(self.drive))
 
     async def _carry_stop_through(self, drive: Drive) -> None:
         try:
             await drive.stop()
         except CompaxError as error:
-            self._may_have_left_moving = True
+            self._in_doubt = "a stop was not seen to its end"
             why = error.what.removeprefix("STOP was not acknowledged: ")
             was_taken = isinstance(error, MoveTimeoutError) or why.startswith("STOP was acknowledged")
             outcome = "ACKNOWLEDGED, BUT NOT SEEN TO STAND" if was_taken else "NOT ACKNOWLEDGED"
             self._report_stop(Level.ALARM, f"{outcome}: use the emergency stop ({why})")
         else:
-            self._may_have_left_moving = False
+            self._in_doubt = None
             self._report_stop(Level.QUIET, "acknowledged, and the axis stands")
         finally:
             self._stopping = None
@@ -183,7 +195,8 @@ class Orders:
     async def _reconcile(self, drive: Drive) -> None:
         status = await drive.reconcile()
         is_moving = status.command_active or status.program_running
-        self._may_have_left_moving &= is_moving
+        if not is_moving:
+            self._in_doubt = None
         seen = "it moves" if is_moving else "no command is active"
         self._tell(f"reconciled: {seen} ({status.as_sent}); it takes motion again", Level.ACTIVE)
 
@@ -203,19 +216,21 @@ class Orders:
 
     async def close(self) -> Farewell:
         """Stop what was started here, close the line, and say what became of the axis."""
-        move, what, was_in_doubt = self._move, self._state.own_motion, self._may_have_left_moving
+        move, what, doubt = self._move, self._state.own_motion, self._in_doubt
         moves_otherwise = self._state.is_seen_moving(self._now())
         error: BaseException | None = None
-        if self.drive is not None:
+        if self.drive is None:
+            error = None if doubt is None else MoveInDoubtError(f"{doubt}, and there is no line to stop it")
+        else:
             try:
-                await self.drive.close()
+                await self._stop_and_close(self.drive, is_in_doubt=doubt is not None)
             except CompaxError as failure:
                 error = failure
         self._is_closed = True
         if self._tasks:
             await asyncio.wait(self._tasks)
         ended = None if move is None or move.cancelled() else move.exception()
-        if error is None and isinstance(ended, MoveInDoubtError):
+        if error is None and move is not None and may_go_on(move, line_is_there=False):
             error = ended
         name = self._state.name
         if error is not None:
@@ -224,6 +239,14 @@ class Orders:
         if move is not None:
             told = getattr(ended, "what", None) or "it has reached its target"
             return Farewell(name, f"{what} was under way: {told}")
-        if was_in_doubt:
+        if doubt is not None:
             return Farewell(name, "something was in doubt: it was stopped, and stands")
         return Farewell(name, "it moves, but was not started here: left alone" if moves_otherwise else "")
+
+    @staticmethod
+    async def _stop_and_close(drive: Drive, *, is_in_doubt: bool) -> None:
+        try:
+            if is_in_doubt:  # which a drive whose line was opened anew cannot know
+                await drive.stop()
+        finally:
+            await drive.close()

@@ -22,7 +22,8 @@ from rich.text import Text
 from ...compax.drive import Drive
 from ...compax.events import ConnectionLost, ConnectionRestored, Fault
 from ...compax.moves import Move
-from ...errors import CompaxError, ConnectionLostError, InvalidCommandError, MoveInDoubtError
+from ...errors import CompaxError, ConnectionLostError, InvalidCommandError
+from ..in_doubt import may_go_on
 from ..keyboard import forget_typed
 from ..unasked import UnaskedText
 from .completion import LineCompleter
@@ -236,7 +237,7 @@ class Session:
         try:
             reply = told_move(await move, self._drive.settings)
         except CompaxError as error:
-            if isinstance(error, MoveInDoubtError):
+            if may_go_on(move, line_is_there=self._drive.is_open):
                 self._underway.note_unseen(move.description, asyncio.get_running_loop().time())
             self._tell(told_error(error))
         else:
