@@ -185,7 +185,7 @@ async def test_a_stop_that_is_not_acknowledged_is_said_to_be_none() -> None:
         await seat.sees("y  ■ STANDING")
         drive_named("x").silent = drive_named("x").deaf = True
         await seat.press("space")
-        await seat.sees("STOP x  … STOP sent, waiting", "STOP y  ■ acknowledged")
+        await seat.sees("STOP x  … waiting for the drive", "STOP y  ■ acknowledged")
         await seat.sees("STOP x  ▲ NOT ACKNOWLEDGED: use the emergency stop")
         await asyncio.sleep(60)
         await seat.sees("STOP x  ▲ NOT ACKNOWLEDGED: use the emergency stop")
