@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from cyclopts import App
 
+from .cutting.cutting import cut
+from .cutting.looking import info
 from .cutting.looking_at_jobs import check, preview
 from .sim import serve_camm1
 
@@ -18,6 +20,8 @@ Begin with `compax camm1 check FILE` and `compax camm1 preview FILE`, which need
 URL`, which moves nothing. An abort from software is no emergency stop: have one within reach.
 """,
 )
+app.command(cut)
 app.command(check)
 app.command(preview)
+app.command(info)
 app.command(serve_camm1, name="sim")

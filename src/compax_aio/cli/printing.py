@@ -135,6 +135,8 @@ def _error_document(error: BaseException) -> dict[str, Any]:
     if isinstance(error, CompaxError):
         for name in ("what", "device", "sent", "received", "hint", "code", "exchanges"):
             told[name] = as_json(getattr(error, name))
+    if (job := getattr(error, "job", None)) is not None:  # what is known of a job of a cutter
+        told["job"] = as_json(job)
     if isinstance(error, OSError) and error.filename is not None:
         told["file"] = str(Path(error.filename))
     told["notes"] = list(getattr(error, "__notes__", ()))

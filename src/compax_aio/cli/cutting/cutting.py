@@ -8,6 +8,8 @@ from typing import Annotated, Final, Literal
 from cyclopts import Parameter
 
 from compax_aio import CompaxError, InvalidCommandError, camm1
+from compax_aio.camm1.cut import Cut
+from compax_aio.camm1.cutter import Cutter
 
 from ..confirming import confirm, expect_somebody
 from ..exit_codes import OK
@@ -96,19 +98,20 @@ async def cut(
 
 
 async def _carry_out(
-    cutter: camm1.Cutter, cut: camm1.Cut, job: PlannedJob, printing: Printing, *, left: list[str], has_keys: bool
+    cutter: Cutter, cut: Cut, job: PlannedJob, printing: Printing, *, left: list[str], has_keys: bool
 ) -> None:
     """Watch a job until it is cut; where the program is interrupted meanwhile, it is aborted, and that is said."""
     name, mm = job.named.name, 1 / cutter.profile.steps_per_mm
     try:
         with (
             in_motion(cutter.name),
-            pause_key(cut, printing, wanted=has_keys) as is_heard,
-            CutView(name, mm, printing, has_keys=is_heard) as view,
+            CutView(name, mm, printing) as view,
+            pause_key(cut, printing, wanted=has_keys, before_interrupt=view.clear) as view.has_keys,
         ):
-            async for progress in cut.progress():
-                view.show(progress)
-            result = await cut
+            async with view.ticking():
+                async for progress in cut.progress():
+                    view.show(progress)
+                result = await cut
     except asyncio.CancelledError:
         await _abort(cutter, cut, name, printing, left)
         raise
@@ -119,13 +122,13 @@ async def _carry_out(
     printing.show(
         {"job": name, "result": result, "outline": job.outline, "problems": [as_data(each) for each in job.problems]},
         f"{name}: cut in {written_time(result.duration_s)}, proved by {result.proved_by}; {result.bytes:,} bytes, "
-        f"{result.instructions:,} instructions, {result.handshake} handshake ({result.handshake_because})",
+        f"{result.instructions:,} instructions, {result.handshake} handshake: {result.handshake_because}",
     )
     for warning in result.warnings:
         printing.note(f"{name}: {warning}")
 
 
-async def _abort(cutter: camm1.Cutter, cut: camm1.Cut, name: str, printing: Printing, left: list[str]) -> None:
+async def _abort(cutter: Cutter, cut: Cut, name: str, printing: Printing, left: list[str]) -> None:
     """Abort a job because the command is interrupted, and let what is true then be said at the end."""
     try:
         cut.cancel()  # .K is on its way when this returns

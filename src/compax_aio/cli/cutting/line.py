@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
 from compax_aio import CompaxError, camm1
+from compax_aio.camm1.connecting import connect
+from compax_aio.camm1.cutter import Cutter
+from compax_aio.camm1.settings import CutterSettings
 
 from ..number_words import NUMBER, WHOLE
 from ..opening import DriveLine
@@ -53,17 +56,17 @@ class CutterLine:
     """Record all that goes over the line to this file, for `compax replay` and `compax trace check`."""
 
     @property
-    def settings(self) -> camm1.CutterSettings:
+    def settings(self) -> CutterSettings:
         """What the options say; raises InvalidCommandError where that cannot be meant."""
-        told = {
+        told: dict[str, Any] = {
             "baud_rate": self.baud_rate,
             "answer_timeout_s": self.answer_timeout,
             "stall_timeout_s": self.stall_timeout,
         }
-        return replace(camm1.CutterSettings(), **{name: value for name, value in told.items() if value is not None})
+        return CutterSettings(**{name: value for name, value in told.items() if value is not None})
 
     @asynccontextmanager
-    async def open(self, url: str, profile: camm1.Profile) -> AsyncIterator[camm1.Cutter]:
+    async def open(self, url: str, profile: camm1.Profile) -> AsyncIterator[Cutter]:
         """
         Connect to the cutter; leaving the block aborts a job that is on its way, and closes the line.
 
@@ -71,7 +74,7 @@ class CutterLine:
         """
         settings = self.settings
         async with DriveLine(trace=self.trace).recorded():
-            cutter = await camm1.connect(url, profile=profile, name=self.name, settings=settings)
+            cutter = await connect(url, profile=profile, name=self.name, settings=settings)
             try:
                 yield cutter
             except CompaxError as error:

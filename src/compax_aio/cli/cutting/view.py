@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import sys
-from collections.abc import Iterator
+from collections.abc import AsyncIterator, Iterator, Mapping
+from contextlib import asynccontextmanager
 from typing import Final
 
 from rich.console import Group
@@ -13,7 +14,7 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from compax_aio import camm1
+from compax_aio.camm1.cut import CutProgress, CutState
 
 from ..outlets import is_held_up
 from ..printing import Printing, notes_console
@@ -21,7 +22,21 @@ from .outline import written_time
 
 __all__ = ["CutView"]
 
-_BAR_WIDTH: Final = 30
+_STATES: Final[Mapping[CutState, str]] = {
+    "starting": "setting up the handshake",
+    "cutting": "cutting",
+    "buffer full": "cutting, the buffer is full",
+    "line held": "the cutter holds the line",
+    "paused": "paused from here",
+    "operator pause": "paused at the panel",
+    "finishing": "all is sent; waiting until it is cut",
+    "aborting": "being aborted",
+    "over": "over",
+}
+_TOLD: Final = frozenset({"cutting", "paused", "operator pause", "finishing", "aborting"})
+"""Without a terminal; others come and go many times."""
+_BAR_WIDTH: Final = 24
+_TICK_S: Final = 0.5
 _LEAST_PAUSE_S: Final = 0.05
 """Between two pictures: nobody sees more, and lines are slow."""
 
@@ -34,19 +49,22 @@ class CutView:
         title: What is cut.
         mm_per_step: Of the machine.
         printing: How it is said.
+
+    Attributes:
         has_keys: Whether ``p`` pauses, which is told then.
     """
 
-    def __init__(self, title: str, mm_per_step: float, printing: Printing, *, has_keys: bool) -> None:
+    def __init__(self, title: str, mm_per_step: float, printing: Printing) -> None:
         self._title = title
         self._mm = mm_per_step
         self._printing = printing
-        self._keys = "   p pauses, Ctrl-C aborts" if has_keys else ""
+        self.has_keys = False
         self._live: Live | None = None
-        self._state = ""
-        self._shown_at = float("-inf")
+        self._state: CutState | None = None
+        self._progress: CutProgress | None = None
+        self._got_at = 0.0
+        self._drawn_at = float("-inf")
         self._most_free = 0
-        self.last: camm1.CutProgress | None = None
 
     def __enter__(self) -> CutView:
         if not self._printing.json and sys.stderr.isatty():
@@ -57,42 +75,72 @@ class CutView:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._live is not None:
-            self._live.stop()
+        self.clear()
 
-    def show(self, progress: camm1.CutProgress) -> None:
+    def clear(self) -> None:
+        """Show nothing any more, and leave the terminal as it was before."""
+        live, self._live = self._live, None
+        if live is not None:
+            live.stop()
+
+    @asynccontextmanager
+    async def ticking(self) -> AsyncIterator[None]:
+        """Let the time go on during a block, also where nothing else happens."""
+        ticker = asyncio.ensure_future(self._tick())
+        try:
+            yield
+        finally:
+            ticker.cancel()
+
+    async def _tick(self) -> None:
+        while True:
+            await asyncio.sleep(_TICK_S)
+            self._draw()
+
+    def show(self, progress: CutProgress) -> None:
         """Show how the cut stands now."""
-        self.last = progress
+        self._progress, self._got_at = progress, self._now()
         self._most_free = max(self._most_free, progress.free_bytes or 0)
         is_news = progress.state != self._state
         self._state = progress.state
         if self._live is None:
-            if is_news:
-                self._printing.note(f"{self._title}: {progress.state}")
-            return
-        now = asyncio.get_running_loop().time()
-        if (is_news or now - self._shown_at >= _LEAST_PAUSE_S) and not is_held_up(self._live.console.file):
-            self._shown_at = now
-            self._live.update(self._picture(progress), refresh=True)
+            if is_news and progress.state in _TOLD:
+                self._printing.note(f"{self._title}: {_STATES[progress.state]}")
+        elif is_news or self._now() - self._drawn_at >= _LEAST_PAUSE_S:
+            self._draw()
 
-    def _picture(self, progress: camm1.CutProgress) -> Group:
+    def _draw(self) -> None:
+        if self._live is not None and self._progress is not None and not is_held_up(self._live.console.file):
+            self._drawn_at = self._now()
+            self._live.update(self._picture(self._progress), refresh=True)
+
+    @staticmethod
+    def _now() -> float:
+        return asyncio.get_running_loop().time()
+
+    def _picture(self, progress: CutProgress) -> Group:
         grid = Table.grid(padding=(0, 1))
         total = progress.bytes_total
         share = f"{100 * progress.bytes_sent / total:3.0f} %" if total else ""
-        bar = ProgressBar(total=total, completed=progress.bytes_sent, width=_BAR_WIDTH)
+        elapsed_s = progress.elapsed_s + self._now() - self._got_at
         grid.add_row(
-            Text(self._title), bar, Text(share), Text(progress.state, style="bold"), written_time(progress.elapsed_s)
+            Text(self._title, no_wrap=True, overflow="ellipsis"),
+            ProgressBar(total=total, completed=progress.bytes_sent, width=_BAR_WIDTH),
+            share,
+            Text(_STATES[progress.state], style="bold"),
+            written_time(elapsed_s),
+            Text("p pauses" if self.has_keys else "", style="dim"),
         )
-        return Group(grid, Text("  " + ", ".join(self._figures(progress)) + self._keys, style="dim"))
+        figures = Text("  " + ", ".join(self._figures(progress)), style="dim", no_wrap=True, overflow="ellipsis")
+        return Group(grid, figures)
 
-    def _figures(self, progress: camm1.CutProgress) -> Iterator[str]:
+    def _figures(self, progress: CutProgress) -> Iterator[str]:
         yield _of(progress.bytes_sent, progress.bytes_total, "bytes")
         yield _of(progress.instructions_sent, progress.instructions_total, "instructions")
-        if progress.position_steps is not None:
-            x, y = progress.position_steps
-            yield f"sent as far as ({x * self._mm:.2f}, {y * self._mm:.2f}) mm"
+        x, y = progress.position_steps
+        yield f"to ({x * self._mm:.2f}, {y * self._mm:.2f}) mm"
         if progress.free_bytes is not None:
-            yield f"{progress.free_bytes:,} bytes free of {self._most_free:,}"
+            yield f"buffer {100 - 100 * progress.free_bytes // max(self._most_free, 1)} % full"
 
 
 def _of(done: int, total: int | None, what: str) -> str:
