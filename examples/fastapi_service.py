@@ -12,9 +12,12 @@ import sys
 from collections.abc import AsyncIterator, Mapping, Sequence
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends, FastAPI, HTTPException, Query, Request
-from fastapi.responses import JSONResponse, StreamingResponse
-from pydantic import BaseModel, ConfigDict
+try:
+    from fastapi import APIRouter, Depends, FastAPI, HTTPException, Query, Request
+    from fastapi.responses import JSONResponse, StreamingResponse
+    from pydantic import BaseModel, ConfigDict
+except ModuleNotFoundError as missing:
+    sys.exit(f"this example needs {missing.name}: pip install fastapi uvicorn")
 
 import compax_aio
 from compax_aio.compax.watch import Reading
@@ -262,7 +265,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         parser.error("--port is 0 to 65535; 0 is any that is free")
     try:
         asyncio.run(serve(create_app(urls), options.port))
-    except compax_aio.CompaxError as error:
+    except (compax_aio.CompaxError, ModuleNotFoundError) as error:
         print(f"{type(error).__name__}: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:  # uvicorn hands signals on when all is done

@@ -275,6 +275,18 @@ def test_words_that_cannot_be_meant_are_refused(
     assert says in capsys.readouterr().err
 
 
+def test_without_fastapi_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "fastapi", None)
+    with pytest.raises(SystemExit, match="needs fastapi: pip install fastapi uvicorn"):
+        load()
+
+
+def test_without_uvicorn_it_says_so(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setitem(sys.modules, "uvicorn", None)
+    assert load().main([]) == 1
+    assert "uvicorn" in capsys.readouterr().err
+
+
 def test_a_port_that_is_taken_is_told(capsys: pytest.CaptureFixture[str]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
