@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
-from typing import Protocol, cast
+from typing import Protocol, cast, runtime_checkable
 
 from compax_aio.errors import TransportError
 
@@ -49,6 +49,15 @@ class SimulatedDevice(Protocol):
         """Take note that nobody is on the line."""
 
 
+@runtime_checkable
+class _Holding(Protocol):
+    """A device that keeps what a host writes from coming, by a modem line or because its driver is full."""
+
+    @property
+    def holds_host(self) -> bool:
+        """Whether it does so now."""
+
+
 class DeviceLine:
     """
     The one line of a device in one event loop; it exists whether somebody is connected or not.
@@ -62,6 +71,8 @@ class DeviceLine:
         self._write: Callable[[bytes], None] | None = None
         self._hold: Callable[[bool], None] | None = None
         self._is_held = False
+        self._holding = device if isinstance(device, _Holding) else None
+        self._is_device_holding = False
         self._cable: Cable | None = None
         self._way: Way | None = None
         self._timer: asyncio.TimerHandle | None = None
@@ -113,6 +124,7 @@ class DeviceLine:
             )
         self._device.connect(self._loop.time())
         self._write, self._hold = write, hold
+        self._is_device_holding = False
         if self._cable is not None:
             self._way = Way(self._cable, self._arrived, self._cable.cut)
         if self._is_held:
@@ -129,8 +141,11 @@ class DeviceLine:
     def hold(self, held: bool) -> None:
         """Leave what is written to the device with who is connected, now or later, as Xoff does; or take it again."""
         self._is_held = held
+        self._tell_held()
+
+    def _tell_held(self) -> None:
         if self._hold is not None:
-            self._hold(held)
+            self._hold(self._is_held or self._is_device_holding)
 
     def disconnect(self) -> None:
         """Let go of who was connected; what was on its way is lost."""
@@ -155,6 +170,9 @@ class DeviceLine:
             self._timer = None
         if self._timer is None and at is not None and not self._loop.is_closed():
             self._timer = self._loop.call_at(at, self._wake, at)
+        if self._holding is not None and self._holding.holds_host != self._is_device_holding:
+            self._is_device_holding = not self._is_device_holding
+            self._tell_held()
         if output and self._way is not None:
             self._way.hand_on("to_host", output)
         elif output:

@@ -14,6 +14,8 @@ from compax_aio.transports.loopback import create_pair, listen
 from compax_aio.transports.registry import ProtocolFactory
 from compax_aio.transports.url import TransportURL
 
+from .camm1.cutter import SimulatedCutter
+from .camm1.knobs import Knobs as CutterKnobs
 from .compax.drive import SimulatedDrive
 from .compax.knobs import Knobs
 from .line import Connection, DeviceLine, SimulatedDevice
@@ -22,6 +24,7 @@ from .smc.line import SimulatedPartyLine
 from .state_file import write_state_file
 
 __all__ = [
+    "cutter_named",
     "drive_named",
     "kept",
     "line_named",
@@ -38,7 +41,7 @@ _NAME: Final = "name"
 _LAST_PORT: Final = 65_535
 
 _File = str | os.PathLike[str]
-_T = TypeVar("_T", SimulatedDrive, SimulatedPartyLine)
+_T = TypeVar("_T", SimulatedDrive, SimulatedPartyLine, SimulatedCutter)
 
 
 @runtime_checkable
@@ -57,7 +60,9 @@ class _Lasting(Protocol):
 
 async def open_simulator(url: TransportURL, protocol_factory: ProtocolFactory) -> asyncio.Transport:
     """
-    Open ``sim://compax?<knobs>`` or ``sim://smc?<knobs>``: a simulated device in this process; each knob is an option.
+    Open ``sim://compax?<knobs>``, ``sim://smc?…`` or ``sim://camm1?…``: a simulated device in this process.
+
+    Each knob is an option.
 
     With ``name=`` all URLs of that name in one event loop are the same device, which lives on between connections;
     without it each connection gets a new one.
@@ -108,6 +113,20 @@ def line_named(name: str, knobs: LineKnobs | None = None) -> SimulatedPartyLine:
         TransportError: The line exists and has other knobs, or a device of another kind has that name.
     """
     return _named(SimulatedPartyLine, name, knobs)
+
+
+def cutter_named(name: str, knobs: CutterKnobs | None = None) -> SimulatedCutter:
+    """
+    Return the cutter that ``sim://camm1?name=...`` opens in the running event loop; it is made if there is none.
+
+    Args:
+        name: Any text.
+        knobs: What the cutter must be like; None: the default for a new one, and anything for one that exists.
+
+    Raises:
+        TransportError: The cutter exists and has other knobs, or a device of another kind has that name.
+    """
+    return _named(SimulatedCutter, name, knobs)
 
 
 @asynccontextmanager
@@ -326,9 +345,15 @@ def _smc(query: Mapping[str, str], name: str | None) -> SimulatedPartyLine:
     return SimulatedPartyLine(knobs) if name is None else line_named(name, knobs if query else None)
 
 
+def _camm1(query: Mapping[str, str], name: str | None) -> SimulatedCutter:
+    knobs = CutterKnobs.from_query(query)
+    return SimulatedCutter(knobs) if name is None else cutter_named(name, knobs if query else None)
+
+
 _KINDS: Final[Mapping[str, Callable[[Mapping[str, str], str | None], SimulatedDevice]]] = {
     "compax": _compax,
     "smc": _smc,
+    "camm1": _camm1,
 }
 
 _devices: dict[asyncio.AbstractEventLoop, dict[str, Any]] = {}
