@@ -7,6 +7,7 @@ from cyclopts import App
 from .cutting.cutting import cut
 from .cutting.looking import info
 from .cutting.looking_at_jobs import check, preview
+from .cutting.stopping import stop
 from .sim import serve_camm1
 
 __all__ = ["app"]
@@ -24,4 +25,5 @@ app.command(cut)
 app.command(check)
 app.command(preview)
 app.command(info)
+app.command(stop)
 app.command(serve_camm1, name="sim")

@@ -7,7 +7,7 @@ from typing import Annotated, Final, Literal
 
 from cyclopts import Parameter
 
-from compax_aio import CompaxError, InvalidCommandError, camm1
+from compax_aio import CompaxError, InvalidCommandError, MoveActiveError, MoveInDoubtError, camm1
 from compax_aio.camm1.cut import Cut
 from compax_aio.camm1.cutter import Cutter
 
@@ -116,6 +116,7 @@ async def _carry_out(
         await _abort(cutter, cut, name, printing, left)
         raise
     except CompaxError as error:
+        _tell_people(error)
         if left:
             error.add_note(f"not begun: {', '.join(left)}")
         raise
@@ -126,6 +127,16 @@ async def _carry_out(
     )
     for warning in result.warnings:
         printing.note(f"{name}: {warning}")
+
+
+def _tell_people(error: CompaxError) -> None:
+    """Say what to do at a terminal, where another thing is to be done than in a program, and nothing twice."""
+    if isinstance(error, MoveActiveError):
+        error.hint = "wait until it is cut; or `compax camm1 stop` drops it, and lifts the tool"
+    elif isinstance(error, MoveInDoubtError):
+        error.hint = "look at the sheet and the machine before you cut anew; `compax camm1 stop` drops what its buffer still holds"
+    notes = getattr(error, "__notes__", [])
+    notes[:] = [each for each in notes if each.removeprefix("job: ") not in error.what]
 
 
 async def _abort(cutter: Cutter, cut: Cut, name: str, printing: Printing, left: list[str]) -> None:
