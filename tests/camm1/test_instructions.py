@@ -142,9 +142,9 @@ def test_a_colon_stands_where_the_machines_manual_prints_one() -> None:
 
 
 def test_what_a_machine_does_not_have_is_refused() -> None:
-    with pytest.raises(InvalidCommandError, match="PNC-1610 has no ESC[.]@"):
+    with pytest.raises(InvalidCommandError, match=r"PNC-1610 has no ESC\.@"):
         encode(DtrControl(), PNC_1610)
-    with pytest.raises(InvalidCommandError, match="PNC-900 has no ESC[.]A"):
+    with pytest.raises(InvalidCommandError, match=r"PNC-900 has no ESC\.A"):
         encode(AskModel(), PNC_900)
     assert encode(ProgrammedOn(), HP_7475A) == b"\x1b.("
 

@@ -211,8 +211,8 @@ class ReplyReader:
 
 # What replies say ----------------------------------------------------------------------------------------------------
 
-_WHOLE: Final = re.compile(r"\d{1,9}")
-_NUMBER: Final = re.compile(r"[+-]?\d{1,12}(?:\.\d{0,6})?")
+_WHOLE: Final = re.compile(r"[0-9]{1,9}")
+_NUMBER: Final = re.compile(r"[+-]?[0-9]{1,12}(?:\.[0-9]{0,6})?")
 
 
 def decode_bytes(text: str, *, of: str = "free space") -> int:
