@@ -149,16 +149,17 @@ async def test_a_cancelled_move_is_told_at_once_and_its_standstill_when_it_is_th
     assert end_of(events).as_mark() == Mark("cancelled", 1000.0, "move_to(1000)")
 
 
-async def test_a_move_that_was_withdrawn_says_that_nothing_was_sent() -> None:
+async def test_a_prepared_move_that_was_withdrawn_does_not_say_that_nothing_was_sent() -> None:
     async with followed() as (drive, far, stream):
         move = drive.prepare_move_to(1000)
         await move.ready
+        assert any("1000," in line for line in lines(far))
         await drive.stop()
         await ending(move)
         assert not far.moving
     ended = end_of(await rest(stream))
     assert (ended.outcome, ended.was_sent) == ("stopped", False)
-    assert ended.as_mark().text.endswith("(nothing had been sent)")
+    assert ended.as_mark().text.endswith("(what starts the motion had not been sent)")
 
 
 async def test_a_fault_is_told_and_then_the_end_of_the_move() -> None:

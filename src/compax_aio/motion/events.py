@@ -101,7 +101,7 @@ class MoveEnded(DriveEvent):
             return Mark("reached", self.target, f"{self.move}, by {self.confirmed_by}")
         why = self.move if self.error is None else self.error.what
         word = "ended by fault" if self.outcome == "fault" else self.outcome  # the fault has a mark of its own
-        return Mark(word, self.target, why if self.was_sent else f"{why} (nothing had been sent)")
+        return Mark(word, self.target, why if self.was_sent else f"{why} (what starts the motion had not been sent)")
 
 
 @dataclass(frozen=True, slots=True)
