@@ -163,6 +163,10 @@ def test_p_is_the_first_letter_of_mode_2_everywhere_else() -> None:
     assert [name for name, _ in seen(b"M0,0\nIN;PA0,0;PU;")] == ["M", "IN", "PA", "PU"]
 
 
+def test_one_instruction_of_mode_2_ends_mode_1_for_p() -> None:
+    assert [name for name, _ in seen(b"M0,0\nVS5;PAR1,1\n")] == ["M", "VS", "PA", "R"]
+
+
 def test_a_lone_p_in_mode_2_swallows_no_job() -> None:
     found = taken_apart(b"PU;P 10;PD10,10;PU;")
     assert [each.name for each in found] == ["PU", "P", "PD", "PU"]
