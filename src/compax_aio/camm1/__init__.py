@@ -9,6 +9,10 @@ if TYPE_CHECKING:
     from ..certainty import Certainty
     from ..severity import Severity
     from .checking import Checker, Problem, Sheet, check, raise_for_errors
+    from .connecting import connect
+    from .cut import Cut, CutAccount, CutProgress, CutResult
+    from .cutter import Cutter
+    from .events import CutBegun, CutEnded, CutterError, CutterPaused, CutterReset, CutterResumed
     from .language.instruction import Instruction, Language
     from .language.job import Job, parse
     from .previewing.drawing import Drawing
@@ -29,6 +33,8 @@ if TYPE_CHECKING:
         Profile,
         profile_named,
     )
+    from .replies import CutterStatus
+    from .settings import CutterSettings
     from .vocabulary import JobSettings
 
 __all__ = [
@@ -46,6 +52,19 @@ __all__ = [
     "PROFILES",
     "Certainty",
     "Checker",
+    "Cut",
+    "CutAccount",
+    "CutBegun",
+    "CutEnded",
+    "CutProgress",
+    "CutResult",
+    "Cutter",
+    "CutterError",
+    "CutterPaused",
+    "CutterReset",
+    "CutterResumed",
+    "CutterSettings",
+    "CutterStatus",
     "Drawing",
     "Instruction",
     "Job",
@@ -56,6 +75,7 @@ __all__ = [
     "Severity",
     "Sheet",
     "check",
+    "connect",
     "parse",
     "preview",
     "profile_named",
@@ -66,6 +86,10 @@ _HOMES: Final[dict[str, tuple[str, ...]]] = {
     "..certainty": ("Certainty",),
     "..severity": ("Severity",),
     ".checking": ("Checker", "Problem", "Sheet", "check", "raise_for_errors"),
+    ".connecting": ("connect",),
+    ".cut": ("Cut", "CutAccount", "CutProgress", "CutResult"),
+    ".cutter": ("Cutter",),
+    ".events": ("CutBegun", "CutEnded", "CutterError", "CutterPaused", "CutterReset", "CutterResumed"),
     ".language.instruction": ("Instruction", "Language"),
     ".language.job": ("Job", "parse"),
     ".previewing.drawing": ("Drawing",),
@@ -74,6 +98,8 @@ _HOMES: Final[dict[str, tuple[str, ...]]] = {
         "CX_24", "DXY_1300", "GS_24", "HP_7470A", "HP_7475A", "PNC_900", "PNC_1050", "PNC_1200", "PNC_1410", "PNC_1600",
         "PNC_1610", "PROFILES", "Profile", "profile_named",
     ),
+    ".replies": ("CutterStatus",),
+    ".settings": ("CutterSettings",),
     ".vocabulary": ("JobSettings",),
 }  # fmt: skip
 """Where each name is, never in a module of that name; new names go here, in __all__, and above."""

@@ -222,6 +222,7 @@ class Cutting:
         if self._is_begun:
             self._set_state("aborting")
             self._aborting = Aborting(self._line)
+            self._line.protocol.pacing = None
         self._may_send.set()
         self._watch.wake.set()
 
@@ -358,6 +359,7 @@ class Cutting:
                 if self._loop.time() - self._watched_at >= self._line.settings.watch_s:
                     self._watched_at = self._loop.time()
                     await self._watch.look_for_errors()
+                    self._note_free(await self._watch.free_space())
         finally:
             await feed.close()
         self._ledger.note_all_sent()
@@ -404,6 +406,9 @@ class Cutting:
             elif is_full:
                 self._set_state("buffer full" if is_job else "finishing")
                 await self._watch.wait_for_room()
+            elif is_job:
+                assert self._pacing is not None
+                await self._watch.look(self._pacing.free_bytes if self._pacing.tells_free_space else None)
 
     async def _send_burst(self, instructions: list[Instruction], *, is_job: bool) -> tuple[int, bool | None]:
         """Write one burst; return how many instructions were written, and whether the buffer is full; None: unknown."""
@@ -456,6 +461,11 @@ class Cutting:
             self._check()
         self._check()
 
+    def _note_free(self, free_bytes: int) -> None:
+        if self._pacing is not None:
+            self._pacing.told(free_bytes)
+            self._note_progress()
+
     def _note_progress(self) -> None:
         pacing = self._pacing
         assert pacing is not None
@@ -484,6 +494,7 @@ class Cutting:
         error = self._final_error(failure) if result is None else None
         self._state = "over"
         self.is_under_way = False
+        self._line.protocol.pacing = None
         await self._order.source.close()
         if self._stop_error is not None or isinstance(error, MoveInDoubtError):
             self._on_doubt(getattr(error, "what", str(error)))
@@ -495,6 +506,7 @@ class Cutting:
 
     async def _stop_machine(self) -> None:
         self._set_state("aborting")
+        self._line.protocol.pacing = None
         aborting = self._aborting or Aborting(self._line)
         try:
             await aborting.carry_through(lifts_with_call=self._ledger.ends_in_mode_1)

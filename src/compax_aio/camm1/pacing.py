@@ -138,6 +138,10 @@ class Pacing(ABC):
     """
 
     handshake: Handshake
+    tells_free_space = False
+    """Whether *free_bytes* is asked for again and again."""
+    may_hold_line = False
+    """Whether the cable holds back what is written, questions too, while the buffer is full."""
     question = FREE_SPACE
     acknowledgement = b""
 
@@ -268,6 +272,12 @@ class Pacing(ABC):
         """Take note that it was held for long: it shall ask."""
         self._wants_to_ask = True
 
+    def told(self, free_bytes: int) -> None:
+        """Take note of free space that was asked for while nothing was outstanding: all is counted that was written."""
+        if free_bytes <= self.room.capacity_bytes:
+            self.confirmed_bytes = self.written_bytes
+            self.free_bytes = free_bytes
+
     def _confirm(self, asked_at: int) -> None:
         self.confirmed_bytes = max(self.confirmed_bytes, asked_at)
         self._is_fresh = asked_at == self.written_bytes
@@ -306,6 +316,7 @@ class SoftwareChecking(_Credit):
     """
 
     handshake: Handshake = "software"
+    tells_free_space = True
 
     def __init__(self, room: Room) -> None:
         super().__init__(room)
@@ -350,6 +361,7 @@ class EnqAck(_Credit):
         self.handshake: Handshake = "enq1" if mode == 1 else "enq2"
         self.block_bytes = min(room.capacity_bytes // 2, room.usable_bytes * 3 // 4, room.window_bytes)
         """Sent for one acknowledgement: so that the cutter has work while it travels, no more than half its buffer."""
+        self._acknowledged_at: int | None = None
 
     @property
     def announced_bytes(self) -> int:
@@ -372,6 +384,16 @@ class EnqAck(_Credit):
             asked_at, self.asked_at = self.asked_at, None
             self._confirm(asked_at)
             self._limit_bytes = max(self._limit_bytes, asked_at + self.block_bytes)
+            self._acknowledged_at = asked_at
+
+    @property
+    def taken_bytes(self) -> int | None:
+        """How many bytes the cutter had taken when it acknowledged, or was asked, last: these at least."""
+        told = super().taken_bytes
+        if self._acknowledged_at is None:
+            return told
+        least = self._acknowledged_at - (self.room.capacity_bytes - self.announced_bytes)
+        return max(0, least, told or 0)
 
 
 class _Stopped(Pacing):
@@ -449,6 +471,7 @@ class Hardwire(_Stopped):
     """A line of the cable stops whatever sends the bytes (DTR, PNC-900 p. 20); little is written beyond that."""
 
     handshake: Handshake = "hardwire"
+    may_hold_line = True
 
 
 def pacing_of(handshake: Handshake, room: Room) -> Pacing:

@@ -143,6 +143,8 @@ class CutterProtocol:
         self._loaded: Burst | None = None
         self._pause_s: float | None = None
         self._waited_s = 0.0
+        self._held_s = 0.0
+        """For how long what was written last could not leave."""
         self._line = bytearray()
         self._is_too_long = False
         self._signals = bytearray()
@@ -173,7 +175,14 @@ class CutterProtocol:
             return leaves_s + self._settings.drained_after_s
         if self.state is State.ASKING and _waits_for_cutting(self._sent):
             return leaves_s + self._settings.cutting_timeout_s
+        if self.state is State.ASKING and self._may_be_held:
+            return leaves_s + self._settings.held_timeout_s
         return leaves_s + self._settings.answered_after_s
+
+    @property
+    def _may_be_held(self) -> bool:
+        """Whether what was asked may wait in the cable, or behind it, where nobody sees it."""
+        return self.pacing is not None and self.pacing.may_hold_line
 
     @property
     def held(self) -> Hold | None:
@@ -262,7 +271,9 @@ class CutterProtocol:
         self._write(text)
 
     def time_ran_out(self) -> None:
-        """Go on after a pause, or give up what is awaited."""
+        """Go on after a pause, or give up what is awaited; a question that the line holds back has its time yet."""
+        if self._is_held_back():
+            return
         if self.state is State.SETTLING:
             self._step(Step.SETTLED)
         elif self.state is State.DRAINING:
@@ -276,6 +287,13 @@ class CutterProtocol:
                 self._has_signs = False  # it answers, and never with a sign
             self._step(Step.TIME_RAN_OUT)
             self._give_up()
+
+    def _is_held_back(self) -> bool:
+        """Whether what was written could not leave, so that nobody can have answered it; not for ever."""
+        if self.state in {State.BURSTING, State.ENDING} or not self._unsent():
+            return False
+        self._held_s += self.patience_s or 0.0
+        return self._held_s < self._settings.held_timeout_s
 
     def resume(self) -> None:
         """Do nothing: the line is never held."""
@@ -448,7 +466,7 @@ class CutterProtocol:
             elif doing is Doing.ASK:
                 data = pacing.question
                 pacing.asked()
-                self._waited_s = 0.0
+                self._waited_s = self._held_s = 0.0
                 self._step(Step.QUESTION_SENT)
             else:
                 break
@@ -487,6 +505,8 @@ class CutterProtocol:
         """How long the answer to the handshake's question may take."""
         settings = self._settings
         patience_s = settings.enquiry_timeout_s if self._paces().acknowledgement else settings.answered_after_s
+        if self._may_be_held:
+            patience_s = settings.held_timeout_s
         return patience_s + self._leaves_s()
 
     def _end_pause(self) -> None:
@@ -555,6 +575,7 @@ class CutterProtocol:
     # Small things ---------------------------------------------------------------------------------------------------
 
     def _write(self, text: str) -> None:
+        self._held_s = 0.0
         self._to_send.append(text.encode("latin-1"))
 
     def _unsent(self) -> int | None:

@@ -36,7 +36,7 @@ class CutterSettings:
     """The same where the cable holds the line (hardwire handshake), so that nobody can ask whether it is paused."""
     look_s: float = 1.0
     """For so long Xon is awaited before free space is asked for: it may be lost."""
-    enquiry_timeout_s: float = 2.0
+    enquiry_timeout_s: float = 0.5
     """For so long ENQ may stay unacknowledged before it is taken back, and free space asked for instead."""
     poll_first_s: float = 0.02
     """After so long a cutter without room is asked again …"""

@@ -20,8 +20,10 @@ __all__ = ["MachineWatch"]
 
 _T = TypeVar("_T")
 
-_LOOK_AFTER_S: Final = 1.0
-"""A cutter that takes nothing for so long is asked whether it is paused, and again after as long."""
+_LOOK_WHEN_FULL_S: Final = 0.25
+"""A cutter with a full buffer is asked so often whether it is paused …"""
+_LOOK_WHEN_UNKNOWN_S: Final = 1.0
+"""… one that does not say how full it is, so often; a nearly empty buffer shows that it is not."""
 _PAUSED_POLL_S: Final = 0.1
 _AGAIN_S: Final = 0.1
 _FEW_BYTES: Final = 48
@@ -92,7 +94,7 @@ class MachineWatch:
 
     def restart(self) -> None:
         """Count anew for how long the cutter takes nothing."""
-        self._changed_at = self._looked_at = self._loop.time()
+        self._changed_at = self._loop.time()
         self._poll_s = self._settings.poll_first_s
 
     @property
@@ -145,10 +147,23 @@ class MachineWatch:
         """
         await self.pause(self._poll_s)
         self._poll_s = min(2 * self._poll_s, self._settings.poll_slowest_s)
-        if self._loop.time() - self._looked_at >= _LOOK_AFTER_S:
-            await self._look_why()
+        await self._look_if_due(_LOOK_WHEN_FULL_S)
 
-    async def _look_why(self) -> None:
+    async def look(self, free_bytes: int | None) -> None:
+        """
+        Look whether the machine is paused, as often as its buffer, by the free space it has told last, gives cause to.
+
+        Raises:
+            MoveTimeoutError, MoveStoppedError: As :meth:`wait_for_room`.
+        """
+        if free_bytes is None:
+            await self._look_if_due(_LOOK_WHEN_UNKNOWN_S)
+        elif free_bytes < self.capacity_bytes * 3 // 4:
+            await self._look_if_due(_LOOK_WHEN_FULL_S)
+
+    async def _look_if_due(self, due_s: float) -> None:
+        if self._loop.time() - self._looked_at < due_s:
+            return
         status = await self.status()
         self._looked_at = self._loop.time()
         if _is_held(status):
