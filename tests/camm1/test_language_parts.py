@@ -1,4 +1,4 @@
-"""Long lists in parts, whole instructions by the room there is, and what is taken out of a job."""
+"""Long lists in parts that draw the same line, what is taken out of a job, and the job itself."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from compax_aio.camm1.language.job import Job, as_bytes, instructions_of, parse
 from compax_aio.camm1.language.numbers import numbers, written_number
 from compax_aio.camm1.language.splitting import split_long
 from compax_aio.camm1.language.stripping import is_output, stripped
-from compax_aio.camm1.language.supply import Supply
 from compax_aio.camm1.profiles import DXY_1300, HP_7475A
 from compax_aio.errors import InvalidCommandError
 
@@ -97,33 +96,6 @@ def test_a_list_that_nothing_ended_is_ended_in_its_parts() -> None:
 def test_what_cannot_be_parted_stays_whole(whole: bytes) -> None:
     instruction = one(whole)
     assert split_long(instruction, 8) == (instruction,)
-
-
-# Supply ---------------------------------------------------------------------------------------------------------------
-
-
-@given(st.lists(st.integers(1, 40), max_size=30), st.lists(st.integers(0, 60), max_size=60))
-def test_a_supply_hands_out_whole_instructions_in_their_order(sizes: list[int], rooms: list[int]) -> None:
-    job = b"".join(b"LB" + b"x" * size + b"\x03" for size in sizes)
-    parsed = parse(job)
-    supply, taken = Supply(parsed), b""
-    for room in rooms:
-        each = supply.take(room)
-        size = sum(len(instruction.data) for instruction in each)
-        assert size <= room
-        assert supply.next_bytes is None or size + supply.next_bytes > room
-        taken += b"".join(instruction.data for instruction in each)
-        assert len(taken) + supply.waiting_bytes == len(job)
-    assert job.startswith(taken)
-
-
-def test_a_supply_can_be_added_to_and_dropped() -> None:
-    supply = Supply()
-    assert (len(supply), supply.next_bytes, supply.take(100)) == (0, None, [])
-    supply.add(parse(b"PU;PD;"))
-    assert (len(supply), supply.waiting_bytes, supply.next_bytes) == (2, 6, 3)
-    assert supply.drop() == 2
-    assert (len(supply), supply.waiting_bytes) == (0, 0)
 
 
 # Stripping ------------------------------------------------------------------------------------------------------------
