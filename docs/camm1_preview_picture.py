@@ -29,7 +29,7 @@ def badge() -> str:
             "IN;PA;VS10;",
             holes,
             _star(5, 850, 340),
-            f"PU{x},{y};CI950;",
+            f"PU{x},{y};CI900;",
             f"PU{x - 1150},{y - 1150};SI0.4,0.55;LBCAMM-1\x03",
             f"PU{x - 1600},{y - 1300};PD{x + 1700},{y - 1300},{x + 1700},{y + 1100},{x - 1600},{y + 1100},"
             f"{x - 1600},{y - 1300};",
@@ -41,13 +41,13 @@ def badge() -> str:
 
 def main() -> None:
     """Draw it."""
-    job = camm1.parse(badge(), camm1.PNC_900)
+    job, sheet = camm1.parse(badge(), camm1.PNC_900), camm1.Sheet(85, 62)
     camm1.preview(
         job,
         Path(__file__).with_name("camm1-preview.svg"),
         profile=camm1.PNC_900,
-        sheet_mm=(100, 70),
-        problems=camm1.check(job, camm1.PNC_900, sheet=(85, 70)),
+        sheet=sheet,
+        problems=camm1.check(job, camm1.PNC_900, sheet),
         title="badge.plt",
     )
 
