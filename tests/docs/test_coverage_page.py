@@ -10,10 +10,12 @@ from pathlib import Path
 
 import pytest
 
+from compax_aio.camm1.facts.instructions import CONTROL_INSTRUCTIONS
+from compax_aio.camm1.facts.mnemonics import COMMON, MODE_1, MODE_2
 from compax_aio.smc.facts import COMMANDS
 
 ROOT = Path(__file__).parents[2]
-PAGES = {"coverage.md": 200, "smc-coverage.md": 55}
+PAGES = {"coverage.md": 200, "smc-coverage.md": 55, "camm1-coverage.md": 90}
 """How many rows each has at least."""
 HEAD = ["subject", "client", "simulator", "tests"]
 
@@ -57,7 +59,7 @@ def test_every_test_that_the_page_names_exists(name: str) -> None:
 
 @pytest.mark.parametrize("page", PAGES)
 def test_a_cell_of_tests_holds_nothing_but_tests(page: str) -> None:
-    cell = re.compile(r"(`[a-z_/]+\.py(::test_\w+)?`(, )?)*")
+    cell = re.compile(r"(`[a-z0-9_/]+\.py(::test_\w+)?`(, )?)*")
     assert not [(number, cells[3]) for number, cells in rows(page) if not cell.fullmatch(cells[3])]
 
 
@@ -96,3 +98,9 @@ def test_every_known_command_of_smc_steppers_has_a_row() -> None:
     subjects = " ".join(cells[0] for _, cells in rows("smc-coverage.md"))
     named = {code[0] for code in re.findall(r"`([^`]+)`", subjects)}
     assert set(COMMANDS) <= named
+
+
+def test_every_known_instruction_of_cutters_has_a_row() -> None:
+    subjects = " ".join(cells[0] for _, cells in rows("camm1-coverage.md"))
+    named = set(re.findall(r"`([^`]+)`", subjects))
+    assert {*MODE_1, *MODE_2, *COMMON, *(f".{letter}" for letter in CONTROL_INSTRUCTIONS)} <= named
