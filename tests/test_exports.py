@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -26,6 +27,11 @@ NOT_NEEDED = [
     *("rich", "numpy", "matplotlib", "serialx", "textual", "prompt_toolkit", "cyclopts", "uvloop", "trustme"),
     *("hypothesis", "pytest", "compax_aio.simulator", "compax_aio.cli", "serial", "serial_asyncio"),
 ]
+
+
+def natural(name: str) -> list[tuple[str, int]]:
+    """Have numbers sorted by their value, as ruff does: ``PNC_900`` before ``PNC_1050``."""
+    return [(letters, int(digits or 0)) for letters, digits in re.findall(r"(\D+|^)(\d*)", name)]
 
 
 def public_classes(module: ModuleType) -> list[type]:
@@ -55,7 +61,7 @@ def test_every_module_lists_what_it_offers(name: str) -> None:
     if hasattr(module, "__path__") and not hasattr(module, "__all__"):
         return  # a package that offers nothing itself
     offered = module.__all__
-    assert list(offered) == sorted(offered, key=lambda each: (not each.isupper(), each[0].islower(), each))
+    assert list(offered) == sorted(offered, key=lambda each: (not each.isupper(), each[0].islower(), natural(each)))
     assert all(hasattr(module, each) for each in offered)
 
 

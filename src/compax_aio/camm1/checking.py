@@ -351,7 +351,7 @@ def check(
     buffer_bytes: int | None = None,
 ) -> tuple[Problem, ...]:
     """
-    Say what is wrong with a job, in its order; nothing found: ``()``.
+    Say what is wrong with a job, in its order, and at last what was only counted; nothing found: ``()``.
 
     What is looked at: unknown instructions, such that the machine may not have, wrong counts of arguments, what is no
     number or out of range; ways outside of the sheet, followed through relative moves and arcs; labels without an end,
@@ -371,7 +371,8 @@ def check(
     each = job.instructions if isinstance(job, Job) else instructions_of(pieces, profile)  # type: ignore[arg-type]
     checker = Checker(profile, sheet, buffer_bytes=buffer_bytes)
     problems = [problem for instruction in each for problem in checker.take(instruction)]
-    return (*problems, *checker.finish())
+    problems += checker.finish()
+    return tuple(sorted(problems, key=lambda problem: (problem.severity is Severity.NOTE, problem.offset)))
 
 
 def raise_for_errors(problems: Iterable[Problem]) -> None:
