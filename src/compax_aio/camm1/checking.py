@@ -20,7 +20,7 @@ from .language.stripping import is_output, stripped
 from .language.tracking import Path, Tracker
 from .profiles import PNC_1610, Profile
 
-__all__ = ["Checker", "Problem", "Sheet", "check", "raise_for_errors"]
+__all__ = ["MOST_OF_A_KIND", "Checker", "Problem", "Sheet", "check", "raise_for_errors"]
 
 MOST_OF_A_KIND: Final = 20
 """So many of one kind are told one by one; the others are counted."""
