@@ -21,6 +21,7 @@ from compax_aio.link.port import Port
 from compax_aio.link.reconnecting import Backoff, Reconnecting, Restored
 from compax_aio.link.seldom import Seldom
 from compax_aio.link.stats import LinkStats
+from compax_aio.link.telling import Telling
 from compax_aio.link.wire import WireHistory
 from compax_aio.transports import registry
 from compax_aio.transports.registry import ProtocolFactory
@@ -222,7 +223,7 @@ async def test_a_line_that_keeps_silent_while_it_is_opened_is_not_opened_twice_a
 async def test_a_line_that_led_nowhere_is_opened_anew_at_once_and_told_as_lost_once(lines: Lines) -> None:
     link = await lines.connect(patience_s=20.0)
     lines.opened[0].script = lambda _: None
-    while link._silence is None:
+    while link._silence.error is None:
         assert isinstance(await failure_of(lines.ask()), CompaxError)
     begun_at = now()
     reading = lines.ask()
@@ -463,7 +464,7 @@ def flood() -> SimpleNamespace:
 
 
 def port_of(tap: Tap) -> Port:
-    port = Port("x", LinkStats(), WireHistory())
+    port = Port("x", LinkStats(), WireHistory(), Telling("x"))
     port.opened(cast("asyncio.Transport", tap))
     return port
 

@@ -134,7 +134,7 @@ async def test_a_motion_that_finds_its_line_leading_nowhere_does_not_begin_when_
     drive = await compax_aio.connect("odd://slow", name="x")
     await drive.program.write(1, MoveTo(50))
     cable.go_half_open()
-    while drive._line.link._silence is None:
+    while drive._line.link._silence.error is None:
         assert isinstance(await outcome(drive.position()), CompaxError)
     mended.clear()
     commanded = asyncio.ensure_future(_awaited(MOTIONS[what](drive)))
@@ -159,7 +159,7 @@ async def test_a_stop_on_a_line_that_says_nothing_is_still_written_on_it() -> No
     drive = await compax_aio.connect(listener.url, name="x", settings=DriveSettings(stop_timeout_s=5))
     fars[0].answers = {f"S{number}": None for number in range(1, 100)}
     fars[0].answers["STOP"] = None
-    while drive._line.link._silence is None:
+    while drive._line.link._silence.error is None:
         assert isinstance(await outcome(drive.position()), CompaxError)
     listener.close()  # a second connection is not to be had
     await outcome(drive.stop())
@@ -171,7 +171,7 @@ async def test_a_stop_on_a_line_that_says_nothing_is_still_written_on_it() -> No
 async def test_a_line_on_which_something_has_come_since_is_not_opened_anew() -> None:
     async with lenient() as (drive, far, cable):
         far.extra_answer_delay_s = 21.0
-        while drive._line.link._silence is None:
+        while drive._line.link._silence.error is None:
             assert isinstance(await outcome(drive.position()), CompaxError)
         far.extra_answer_delay_s = 0.0
         heard = drive.stats.bytes_received

@@ -219,7 +219,7 @@ async def test_an_opener_that_fails_in_its_own_way_once_is_tried_again(
 async def test_a_line_that_led_nowhere_and_is_then_lost_is_opened_once() -> None:
     async with lenient() as (drive, far, cable):
         cable.half_open = True
-        while drive._line.link._silence is None:
+        while drive._line.link._silence.error is None:
             assert isinstance(await outcome(drive.position()), CompaxError)
         await asyncio.sleep(5)
         assert cable.opened == 1, "what is asked next opens it anew"

@@ -22,6 +22,11 @@ class Deadline:
         self._at = 0.0
         self._timer: asyncio.TimerHandle | None = None
 
+    @property
+    def is_running(self) -> bool:
+        """Whether somebody will be called."""
+        return self._timer is not None
+
     def put_off(self, by_s: float) -> None:
         """Count *by_s* from now."""
         self._at = self._loop.time() + by_s

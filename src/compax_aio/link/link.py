@@ -11,19 +11,21 @@ import asyncio
 import logging
 from collections.abc import Awaitable, Callable, Mapping
 from functools import partial
-from typing import Any, Final, cast
+from typing import Any, cast
 
 from ..errors import AnswerTimeoutError, CompaxError, ConnectionLostError, TransportError
-from ..transports.registry import open_transport
-from ..transports.url import TransportURL
+from .attempts import Attempts
 from .contract import DeviceProtocol, Event, Hold, Lane, TurnOver
 from .exchanges import Exchange
 from .failures import Failures
+from .patience import Patience
 from .port import Port
 from .reconnecting import Reconnecting
 from .seldom import Seldom
+from .silence import Silence
 from .stats import LinkStats
-from .taps import Asked, Closed, Ended, Fact, LineTap, Lost, Opening, Ready, Refused, Resumed, tap_of
+from .taps import Closed, Lost, Ready, Resumed
+from .telling import Telling
 from .turns import Turns
 from .wire import WireHistory
 
@@ -77,12 +79,11 @@ class Link(asyncio.Protocol):
             advice_on_silence=advice_on_silence,
         )
         self._on_lost = on_lost
-        self._greet = greet
         self._reconnecting = reconnecting
         self._loop = asyncio.get_running_loop()
-        self._tap = tap_of(name, about)
-        self._asked = 0
-        self._port = Port(name, self.stats, self.history, self._tap)
+        self._telling = Telling(name, about)
+        self._port = Port(name, self.stats, self.history, self._telling)
+        self._silence = Silence(self._port, reconnecting, self._failures)
         self._turns = Turns(
             protocol,
             name=name,
@@ -95,13 +96,19 @@ class Link(asyncio.Protocol):
             on_event=on_event,
             on_silence=self._note_silence,
             spares=self._came_during_attempt,
-            tap=self._tap,
+            telling=self._telling,
         )
         self._url = ""
         self._is_closing = self._is_lost = False
-        self._silence: AnswerTimeoutError | None = None
-        self._attempts = 0
-        self._end: _End | None = None
+        self._attempts = Attempts(
+            self,
+            turns=self._turns,
+            stats=self.stats,
+            telling=self._telling,
+            reconnecting=reconnecting,
+            greet=greet,
+        )
+        self._patience = Patience(reconnecting, self._attempts)
 
     # Opening and closing --------------------------------------------------------------------------------------------
 
@@ -123,42 +130,11 @@ class Link(asyncio.Protocol):
         self.admit()
 
     async def _connect(self) -> None:
-        url = TransportURL.parse(self._url)
-        self._turns.queue.is_admitted = False
-        self._attempts += 1
-        self._tell(Opening(str(url)))
-        try:
-            await self._connect_to(url)
-        except BaseException as error:
-            self._tell(Refused(str(error) or type(error).__name__))
-            raise
+        await self._attempts.make(self._url, self._check_there)
 
-    async def _connect_to(self, url: TransportURL) -> None:
-        self.stats.openings += 1
-        in_step = self._turns.until_in_step()
-        in_step.add_done_callback(lambda each: each.cancelled() or each.exception())  # if the opener fails, nobody asks
-        try:
-            async with asyncio.timeout(self._opening_s):
-                await open_transport(url, self._take_end)
-        except BaseException:
-            in_step.cancel()
-            raise
-        await in_step
-        if self._greet is not None:
-            await self._greet()
-        if not self._port.is_there:  # lost in one breath with the last answer
+    def _check_there(self) -> None:
+        if not self._port.is_there:
             raise self._lost(None)
-
-    @property
-    def _opening_s(self) -> float | None:
-        """How long an opener may take to get a lost line back; the first time it is the caller who waits."""
-        return self._reconnecting.patience_s if self._reconnecting is not None and self._attempts > 1 else None
-
-    def _take_end(self) -> _End:
-        if self._end is not None:
-            self._end.let_go()
-        self._end = _End(self)
-        return self._end
 
     async def close(self) -> None:
         """Close the line; what still waits fails with ConnectionLostError. Takes at most a second or two."""
@@ -168,7 +144,7 @@ class Link(asyncio.Protocol):
             await self._reconnecting.end()
         await self._close_port()
         self._turns.fail_waiting(self._lost)
-        self._tell(Closed())
+        self._telling.tell(Closed())
 
     async def _close_port(self) -> None:
         if not await self._port.close():
@@ -200,9 +176,9 @@ class Link(asyncio.Protocol):
 
     def admit(self) -> None:
         """Let everything that waits go over the line."""
-        if self._attempts > 1:
+        if self._attempts.count > 1:
             self.stats.reconnects += 1
-        self._tell(Ready(self._attempts))
+        self._telling.tell(Ready(self._attempts.count))
         self._turns.admit()
 
     def lose_patience(self) -> None:
@@ -214,7 +190,7 @@ class Link(asyncio.Protocol):
         self._is_lost = True
         loss = self._lost(None, error)
         self._turns.fail_waiting(lambda exchange: self._lost(exchange, error))
-        self._tell(Closed())
+        self._telling.tell(Closed())
         self._on_lost(loss)
 
     @property
@@ -225,11 +201,11 @@ class Link(asyncio.Protocol):
     @property
     def times_opened(self) -> int:
         """How often the line has been opened, or tried to: tell it to :meth:`check_not_lost` later."""
-        return self._attempts
+        return self._attempts.count
 
     def check_not_lost(self, since: int) -> None:
         """Raise ConnectionLostError if there is no line, or another one than when it was opened *since* times."""
-        if self.is_over or not self._port.is_there or self._attempts != since:
+        if self.is_over or not self._port.is_there or self._attempts.count != since:
             raise self._lost(None)
 
     @property
@@ -287,30 +263,19 @@ class Link(asyncio.Protocol):
         """
         waiter: asyncio.Future[TurnOver] = self._loop.create_future()
         survives_loss &= lane is not Lane.GREETING
-        exchange = Exchange(
-            text, lane, settles_late, survives_loss, self._attempts, self._loop.time(), on_sent, party, [waiter]
-        )
-        if self._tap is not None:
-            self._tell_asked(self._tap, exchange, waiter)
-        if self._silence is not None and not self.is_over:
+        attempt, now = self._attempts.count, self._loop.time()
+        exchange = Exchange(text, lane, settles_late, survives_loss, attempt, now, on_sent, party, [waiter])
+        if self._telling.is_heard:
+            self._telling.asked(exchange, waiter)
+        if self._silence.error is not None and not self.is_over:
             if lane is Lane.STOP:
                 self._turns.say_ahead(exchange)  # it may be heard, although nothing comes back
-            self._renew(self._silence)
+            self._renew(self._silence.error)
         if not self._takes(exchange):
             waiter.set_exception(self._lost(exchange))
             return waiter
         self._turns.put(exchange)
         return waiter
-
-    def _tell(self, fact: Fact) -> None:
-        if self._tap is not None:
-            self._tap(fact)
-
-    def _tell_asked(self, tap: LineTap, exchange: Exchange, waiter: asyncio.Future[TurnOver]) -> None:
-        self._asked += 1
-        number = exchange.number = self._asked
-        tap(Asked(number, exchange.text, exchange.lane, exchange.party))
-        waiter.add_done_callback(lambda each: tap(Ended.of(number, each)))
 
     def _takes(self, exchange: Exchange) -> bool:
         if self.is_over or self._port.is_there:
@@ -350,7 +315,7 @@ class Link(asyncio.Protocol):
 
     def resume(self) -> None:
         """Take a person's word that what the line is :attr:`held` for can do no harm, and get in step; else nothing."""
-        self._tell(Resumed())
+        self._telling.tell(Resumed())
         self._turns.resume()
 
     def extra_info(self, name: str) -> Any:
@@ -382,8 +347,8 @@ class Link(asyncio.Protocol):
     def connection_lost(self, exc: Exception | None) -> None:
         """Fail what tells something: nobody can say any more what becomes of it. What asks may wait for the line."""
         self._port.ended()
-        self._tell(Lost(None if exc is None else str(exc) or type(exc).__name__))
-        self._silence = None
+        self._telling.tell(Lost(None if exc is None else str(exc) or type(exc).__name__))
+        self._silence.forget()
         self._turns.line_lost()
         was_admitted, self._turns.queue.is_admitted = self._turns.queue.is_admitted, False
         self._fail_what_tells(exc)
@@ -401,35 +366,23 @@ class Link(asyncio.Protocol):
         self._turns.fail_waiting(lambda exchange: self._lost(exchange, cause), but=self._waits_for_line)
 
     def _waits_for_line(self, exchange: Exchange) -> bool:
-        """Whether it goes on waiting: for so long as anybody waits; after that, for the attempt that comes next."""
-        reconnecting = self._reconnecting
-        if not exchange.survives_loss or reconnecting is None or self.is_over:
-            return False
-        if not reconnecting.is_patient:
-            return exchange.attempt == self._attempts
-        return self._loop.time() - exchange.queued_at < reconnecting.patience_s
+        return not self.is_over and self._patience.has(exchange)
 
     def _came_during_attempt(self, exchange: Exchange) -> bool:
         """Whether it was asked on a line that is lost while that was being opened: the next attempt is its first."""
         is_attempt = not self._turns.queue.is_admitted
-        return is_attempt and self._waits_for_line(exchange) and exchange.attempt == self._attempts
+        return is_attempt and self._waits_for_line(exchange) and self._patience.is_new(exchange)
 
     def _note_silence(self) -> None:
-        """Let a line on which nothing has come for long be opened anew when it is used next: it may lead nowhere."""
-        if self._reconnecting is not None and self._turns.queue.is_admitted:
-            silent_s = self._loop.time() - self._port.heard_at
-            is_long = silent_s >= max(self._reconnecting.patience_s * _SILENT_SHARE, _SHORTEST_SILENCE_S)
-            leads_nowhere = self._port.is_stuck or is_long
-            self._silence = self._failures.silence(None) if leads_nowhere else None
+        if self._turns.queue.is_admitted:
+            self._silence.note()
 
     def _renew(self, silence: AnswerTimeoutError) -> None:
+        """Open the line anew, which may lead nowhere."""
         assert self._reconnecting is not None
-        self._silence = None
+        self._silence.forget()
         self._turns.queue.is_admitted = False
-        if self._port.is_stuck:
-            self._port.hang_up()
-        else:
-            self._port.let_go()
+        self._port.let_go()
         self._reconnecting.begin(self, self._lost(None, silence), at_once=True)
 
     def _lost(self, exchange: Exchange | None, cause: Exception | None = None) -> ConnectionLostError:

@@ -9,7 +9,8 @@ from math import ceil
 from typing import Any, Final
 
 from .stats import LinkStats
-from .taps import LetGo, LineTap, Opened, Received
+from .taps import LetGo, Opened, Received
+from .telling import Telling
 from .wire import WireHistory, readable
 
 __all__ = ["Port"]
@@ -38,14 +39,14 @@ class Port:
         name: For logs.
         stats: Bytes are counted there.
         history: The last ones are kept there.
-        tap: Is told of them, too.
+        telling: Tells of them, too.
     """
 
-    def __init__(self, name: str, stats: LinkStats, history: WireHistory, tap: LineTap | None = None) -> None:
+    def __init__(self, name: str, stats: LinkStats, history: WireHistory, telling: Telling) -> None:
         self._name = name
         self._stats = stats
         self._history = history
-        self._tap = tap
+        self._telling = telling
         self._loop = asyncio.get_running_loop()
         self._transport: asyncio.Transport | None = None
         self._unread = bytearray()
@@ -68,8 +69,8 @@ class Port:
         self._unread.clear()
         self.heard_at = self._sent_at = self._loop.time()
         self._end = self._loop.create_future()
-        if self._tap is not None:
-            self._tap(Opened())
+        if self._telling.is_heard:
+            self._telling.tell(Opened())
 
     def extra_info(self, name: str) -> Any:
         """Return what the transport says of itself under *name*; None if it says nothing, or is not there."""
@@ -145,8 +146,8 @@ class Port:
             transport.resume_reading()
 
     def _read(self, piece: bytes, read: Callable[[bytes], None]) -> None:
-        if self._tap is not None:
-            self._tap(Received(piece))
+        if self._telling.is_heard:
+            self._telling.tell(Received(piece))
         read(piece)
 
     def hang_up(self) -> None:
@@ -157,7 +158,13 @@ class Port:
             transport.abort()
 
     def let_go(self) -> None:
-        """Let go of the transport when it has sent what waits, within half a second; it reports its end then."""
+        """
+        Let go of the transport when it has sent what waits, within half a second; it reports its end then.
+
+        One that takes nothing is let go of at once.
+        """
+        if self.is_stuck:
+            self.hang_up()
         transport, self._transport = self._transport, None
         end = self._end
         if transport is not None and end is not None:
@@ -184,8 +191,8 @@ class Port:
         return False
 
     def _tell_let_go(self, transport: asyncio.Transport) -> None:
-        if self._tap is not None and not transport.is_closing():
-            self._tap(LetGo())
+        if self._telling.is_heard and not transport.is_closing():
+            self._telling.tell(LetGo())
 
 
 def _unsent_by_driver(transport: asyncio.Transport) -> int:

@@ -39,6 +39,11 @@ class LinkStats:
     answer_times_s: deque[float] = field(default_factory=lambda: deque(maxlen=_ANSWERS_KEPT), repr=False)
     """Of the last 256 lines answered in their turn, oldest first: from being written to the answer being read."""
 
+    def answered(self, after_s: float) -> None:
+        """Count a line that was answered in its turn."""
+        self.exchanges += 1
+        self.answer_times_s.append(after_s)
+
     def answer_time_s(self, percentile: float) -> float | None:
         """
         Return the time within which that share of the last answers came; None before the first.

@@ -31,7 +31,6 @@ __all__ = [
     "Tap",
     "Way",
     "plain",
-    "tap_of",
 ]
 
 
@@ -185,21 +184,6 @@ Tap = Callable[[str, Mapping[str, object]], LineTap]
 
 TAPS: ContextVar[tuple[Tap, ...]] = ContextVar("taps", default=())
 """Those that hear of lines which are made in this context, so by this task and by those that it starts."""
-
-
-def tap_of(name: str, about: Callable[[], Mapping[str, object]] | None) -> LineTap | None:
-    """Return what is to be told what happens on a new line; None if nobody wants to know."""
-    taps = TAPS.get()
-    if not taps:
-        return None
-    said = about() if about is not None else {}
-    ears = [tap(name, said) for tap in taps]
-
-    def tell_all(fact: Fact) -> None:
-        for ear in ears:
-            ear(fact)
-
-    return ears[0] if len(ears) == 1 else tell_all
 
 
 def plain(value: Any) -> Any:

@@ -31,7 +31,8 @@ from .failures import Failures
 from .port import Port
 from .seldom import Seldom
 from .stats import LinkStats
-from .taps import LineTap, Noticed, Sent, Way
+from .taps import Noticed, Sent, Way
+from .telling import Telling
 from .wire import WireHistory
 
 __all__ = ["Turns"]
@@ -53,7 +54,7 @@ class Turns:
         on_event: Called with every event that is not about turns, as soon as it is read.
         on_silence: Called when nobody has answered any marker.
         spares: Says what goes on waiting although there is no answer to what was sent until now.
-        tap: Is told what is written and noticed.
+        telling: Tells what is written and noticed.
     """
 
     def __init__(
@@ -70,7 +71,7 @@ class Turns:
         on_event: Callable[[Event], None],
         on_silence: Callable[[], None],
         spares: Callable[[Exchange], bool],
-        tap: LineTap | None = None,
+        telling: Telling,
     ) -> None:
         self.lines_sent = 0
         self.queue = ExchangeQueue()
@@ -85,9 +86,9 @@ class Turns:
         self._on_event = on_event
         self._on_silence = on_silence
         self._spares = spares
-        self._tap = tap
+        self._telling = telling
         self._loop = asyncio.get_running_loop()
-        self._reads_timer: asyncio.TimerHandle | None = None
+        self._reads_hold = Deadline(self.release_reads)
         self._outstanding: Exchange | None = None
         self._unproved: list[tuple[Exchange, TurnOver]] = []
         """Stops that were acknowledged before it was known by whom."""
@@ -100,7 +101,8 @@ class Turns:
         self._is_ended = False
         self._deadline = Deadline(self._time_is_up)
         self._began_at = 0.0
-        self._grace: asyncio.TimerHandle | None = None
+        self._grace = Deadline(self.pump)
+        """So long is waited on for a late answer where nothing may be sent to get in step."""
 
     # What the link does ---------------------------------------------------------------------------------------------
 
@@ -119,7 +121,6 @@ class Turns:
         """Write *stop*, which waits for the next line, on one that is about to be let go of."""
         if self._port.is_there and self._protocol.in_doubt and not self._protocol.is_busy and not self._port.is_stuck:
             self._send_ahead(stop)
-            self._flush(Way.AHEAD, stop)
 
     def until_in_step(self) -> asyncio.Future[None]:
         """Return a future that is done when the line is in step, or fails with all else that waits."""
@@ -175,15 +176,12 @@ class Turns:
     def hold_reads(self, for_s: float) -> None:
         """Let what waits in ``Lane.READ`` wait on, at most *for_s* from now; what is on the wire goes on."""
         self.queue.reads_are_held = True
-        if self._reads_timer is not None:
-            self._reads_timer.cancel()
-        self._reads_timer = self._loop.call_later(for_s, self.release_reads)
+        self._reads_hold.put_off(for_s)
 
     def release_reads(self) -> None:
         """Let reads go on; harmless when they are not held back."""
-        if self._reads_timer is not None:
-            self._reads_timer.cancel()
-            self._reads_timer = None
+        if self.queue.reads_are_held:
+            self._reads_hold.cancel()
             self.queue.reads_are_held = False
             self.pump()
 
@@ -192,7 +190,7 @@ class Turns:
         if self._protocol.held is None:
             return
         self._protocol.resume()
-        self._end_grace()
+        self._grace.cancel()
         self._fail_doubtful()
         self._begin_doubt()
         self.pump()
@@ -205,7 +203,7 @@ class Turns:
         while self._port.is_there and not (self._is_ended or protocol.is_busy or self._is_reading):
             if protocol.in_doubt:
                 if not self._pursue_doubt():
-                    if self._grace is None:
+                    if not self._grace.is_running:
                         self._give_up()
                     return
             elif (exchange := self.queue.take_next()) is not None:
@@ -224,8 +222,8 @@ class Turns:
         if data := self._protocol.bytes_to_send():
             goes_on = way is Way.GOES_ON
             self.lines_sent += not goes_on
-            if self._tap is not None and self._port.is_there:
-                self._tap(Sent(data, exchange.number if exchange is not None else None, way))
+            if self._telling.is_heard and self._port.is_there:
+                self._telling.tell(Sent(data, exchange.number if exchange is not None else None, way))
             self._port.write(data, goes_on=goes_on)
 
     def _give_time(self) -> None:
@@ -237,8 +235,8 @@ class Turns:
         self._is_reading = True
         try:
             for event in self._protocol.events():
-                if self._tap is not None and not isinstance(event, GoesOn):
-                    self._tap(Noticed.of(event))
+                if self._telling.is_heard and not isinstance(event, GoesOn):
+                    self._telling.tell(Noticed.of(event))
                 self._handle(event)
         finally:
             self._is_reading = False
@@ -266,18 +264,14 @@ class Turns:
 
     def _turn_is_over(self, outcome: TurnOver) -> None:
         exchange, self._outstanding = self._outstanding, None
-        self._count(outcome)
+        if isinstance(outcome, TurnLost):
+            self._stats.lost_turns += 1
+        else:
+            self._stats.answered(self._loop.time() - self._began_at)
         if self._protocol.in_doubt:
             self._begin_doubt()
         if exchange is not None:
             self._end(exchange, outcome)
-
-    def _count(self, outcome: TurnOver) -> None:
-        if isinstance(outcome, TurnLost):
-            self._stats.lost_turns += 1
-        else:
-            self._stats.exchanges += 1
-            self._stats.answer_times_s.append(self._loop.time() - self._began_at)
 
     def _end(self, exchange: Exchange, outcome: TurnOver) -> None:
         if exchange.lane is Lane.STOP and not self.queue.is_admitted:
@@ -308,13 +302,11 @@ class Turns:
                 return False
             self._markers_left -= 1
             self._send_ahead(stop)
-            self._flush(Way.AHEAD, stop)
         elif stop is not None and self._may_send_ahead:
             # In turn with the markers, for half a line in the device's buffer may spoil either; the exchange itself
             # follows when in step.
             self._may_send_ahead = False
             self._send_ahead(stop)
-            self._flush(Way.AHEAD, stop)
         else:
             self._markers_left -= 1
             self._may_send_ahead = True
@@ -326,12 +318,13 @@ class Turns:
     def _send_ahead(self, stop: Exchange) -> None:
         stop.times_ahead += 1
         self._protocol.send_ahead(stop.text)
+        self._flush(Way.AHEAD, stop)
 
     def _end_doubt(self) -> None:
         self._stats.resynchronisations += 1
         self._markers_left = 0
         self._is_pursuing = False
-        self._end_grace()
+        self._grace.cancel()
         self._fail_doubtful()
         if self._in_step is not None and not self._in_step.done():
             self._in_step.set_result(None)
@@ -353,7 +346,7 @@ class Turns:
         but: Callable[[Exchange], bool] = lambda _: False,
     ) -> None:
         """Fail everything that waits, the opening too; those for which *but* holds are queued anew."""
-        self._end_grace()
+        self._grace.cancel()
         self._markers_left = 0
         self._is_pursuing = False
         waiting = [exchange for exchange in (self._doubtful, self._outstanding) if exchange is not None]
@@ -378,8 +371,7 @@ class Turns:
     # Time -----------------------------------------------------------------------------------------------------------
 
     def _time_is_up(self) -> None:
-        was_busy = self._protocol.is_busy
-        if not was_busy:
+        if not self._protocol.is_busy:
             return
         self._protocol.time_ran_out()
         self._flush(Way.GOES_ON)
@@ -402,14 +394,4 @@ class Turns:
             self._fail_doubtful()
         self._begin_doubt()
         if self._protocol.held is not None:
-            self._grace = self._loop.call_later(self._answer_timeout_s, self._grace_is_over)
-
-    def _grace_is_over(self) -> None:
-        """Where nothing may be sent to get in step, a late answer is waited for no longer."""
-        self._end_grace()
-        self.pump()
-
-    def _end_grace(self) -> None:
-        if self._grace is not None:
-            self._grace.cancel()
-            self._grace = None
+            self._grace.put_off(self._answer_timeout_s)
