@@ -4,7 +4,8 @@ Every Python block of README and documents runs, and what stands under it as its
 The blocks of a page are one program: they share names and an event loop on a virtual clock, and may await. A fence
 marked ``output`` right after a block holds all that the block prints, from the beginning of a line to its end; ``...``
 stands for anything on one line. A fence marked ``console`` is a session: its ``$ compax`` lines are carried out one
-after the other, and print what stands under them, a line ``...`` standing for any number of lines. In ``sh`` fences,
+after the other, and print what stands under them, a line ``...`` standing for any number of lines; its ``$ printf``
+lines make files, by the shell. In ``sh`` fences,
 commands of ``compax`` are ones that it understands.
 """
 
@@ -16,6 +17,7 @@ import inspect
 import itertools
 import re
 import shlex
+import subprocess
 import textwrap
 from collections.abc import Callable, Coroutine, Iterator
 from dataclasses import dataclass
@@ -174,6 +176,8 @@ def test_a_session_of_a_page_prints_what_the_page_says(
     with asyncio.Runner(loop_factory=VirtualClockLoop) as runner:
         monkeypatch.setattr(asyncio, "run", runner.run)
         for line, command, expected in sessions_of(page):
+            if command.startswith("printf "):
+                subprocess.run(command, shell=True, check=True)
             for words in commands_in(f"$ {command}", "$ "):
                 run_command(words)
                 told = capfd.readouterr()

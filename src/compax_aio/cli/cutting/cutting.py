@@ -134,7 +134,7 @@ def _tell_people(error: CompaxError) -> None:
     if isinstance(error, MoveActiveError):
         error.hint = "wait until it is cut; or `compax camm1 stop` drops it, and lifts the tool"
     elif isinstance(error, MoveInDoubtError):
-        error.hint = "look at the sheet and the machine before you cut anew; `compax camm1 stop` drops what its buffer still holds"
+        error.hint = "look at the sheet before you cut anew; `compax camm1 stop` drops what is left in its buffer"
     notes = getattr(error, "__notes__", [])
     notes[:] = [each for each in notes if each.removeprefix("job: ") not in error.what]
 
@@ -148,6 +148,9 @@ async def _abort(cutter: Cutter, cut: Cut, name: str, printing: Printing, left: 
         printing.note(f"{cutter.name} may still be cutting: look at it, and use its switch if it is.")
         raise
     more = f" Not begun: {', '.join(left)}." if left else ""
-    say_at_end(f"Interrupted. {name}: the job was aborted, and the tool is up; {cut.account}.{more}")
+    say_at_end(
+        f"Interrupted. {name}: the job was aborted; the vector under way is cut to its end, then the tool is lifted. "
+        f"What is known: {cut.account}.{more}"
+    )
     if printing.json:
         printing.show({"job": name, "interrupted": True, "aborted": True, "account": cut.account, "not_begun": left})

@@ -20,7 +20,7 @@ from .line import CutterLine, CutterUrl, Machine
 
 __all__ = ["CutterInfo", "info"]
 
-_HANDSHAKE = "none between jobs: the line was reset as it was opened (ESC.R), and each job sets up its own"
+_HANDSHAKE = "none between jobs: opening the line has reset it (ESC.R); each job sets up its own"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -28,9 +28,8 @@ async def stop(
     """
     async with line.open(url, machine.known()) as cutter:
         status = await cutter.stop()
-    paused = (
-        "; it is paused at the panel, and lifts the tool when it goes on" if status.is_paused else ", the tool is up"
-    )
+    when = "when the machine, which is paused, goes on" if status.is_paused else "once the vector under way is cut"
     printing.show(
-        {"cutter": cutter.name, "stopped": True, "status": status}, f"{cutter.name}: its buffer is empty{paused}"
+        {"cutter": cutter.name, "stopped": True, "status": status},
+        f"{cutter.name}: its buffer is empty; the tool goes up {when}",
     )

@@ -61,6 +61,7 @@ class CutView:
         self.has_keys = False
         self._live: Live | None = None
         self._state: CutState | None = None
+        self._told: CutState | None = None
         self._progress: CutProgress | None = None
         self._got_at = 0.0
         self._drawn_at = float("-inf")
@@ -104,7 +105,8 @@ class CutView:
         is_news = progress.state != self._state
         self._state = progress.state
         if self._live is None:
-            if is_news and progress.state in _TOLD:
+            if progress.state in _TOLD and progress.state != self._told:
+                self._told = progress.state
                 self._printing.note(f"{self._title}: {_STATES[progress.state]}")
         elif is_news or self._now() - self._drawn_at >= _LEAST_PAUSE_S:
             self._draw()
