@@ -16,12 +16,15 @@ import pexpect
 import pytest
 from rich.console import Console
 
+from compax_aio import AnswerTimeoutError
 from compax_aio.cli import app
+from compax_aio.cli.stepping.line import AxisOnLine
 from compax_aio.simulator.clock import VirtualClockLoop
 from compax_aio.simulator.server import line_named, serve_pty, serve_tcp
 from compax_aio.simulator.smc import Knobs, LogKind, SimulatedPartyLine
 from compax_aio.simulator.smc.language import Instruction
 from compax_aio.simulator.smc.log import Ending, LogEntry
+from compax_aio.smc import SmcAxis
 
 LIMIT_S = 60.0
 """Generous: a busy machine takes its time to start a process."""
@@ -307,6 +310,79 @@ def test_one_that_is_missing_keeps_no_other_from_being_stopped(compax: Compax, o
     assert code == 4
     assert "axis X has acknowledged the stop" in text
     assert "AnswerTimeoutError" in text
+
+
+def test_stops_that_are_interrupted_come_to_their_end(compax: Compax, on_stage: Plan) -> None:
+    for name in "XZ":
+        on_stage(0.0, lambda bus, name=name: bus.axes[name].jog(20_000))
+    on_stage(0.3, ctrl_c)
+    code, text = compax("stop", BUS, "X", "Z")
+    assert code == 130
+    assert "Interrupted. Acknowledged the stop, and stand: axis X, axis Z." in text
+
+
+def test_a_search_that_is_interrupted_says_whom_it_has_stopped(compax: Compax, on_stage: Plan) -> None:
+    on_stage(0.0, lambda bus: bus.axes["X"].jog(20_000))
+    on_stage(14.5, ctrl_c)
+    code, text = compax("stop", BUS)
+    assert code == 130
+    assert "Interrupted. Acknowledged the stop, and stand: axis X, axis Y, axis Z. Not every name had been asked." in text
+
+
+def test_a_search_that_is_interrupted_before_it_finds_any_says_so(compax: Compax, on_stage: Plan) -> None:
+    on_stage(1.0, ctrl_c)
+    code, text = compax("stop", BUS)
+    assert code == 130
+    assert "Interrupted. No axis was stopped. Not every name had been asked." in text
+
+
+def test_a_stop_that_is_interrupted_and_never_acknowledged_is_told(compax: Compax, on_stage: Plan) -> None:
+    on_stage(0.0, lambda bus: bus.power_off())
+    on_stage(0.5, ctrl_c)
+    code, text = compax("stop", BUS, "X")
+    assert code == 4
+    assert "the soft stop was not acknowledged" in text
+    assert "look whether the machine stands" in text
+
+
+def test_a_stop_that_fails_is_told_once_with_what_to_check(compax: Compax, on_stage: Plan) -> None:
+    on_stage(0.0, lambda bus: bus.power_off())
+    code, text = compax("stop", BUS, "X")
+    assert code == 4
+    assert text.count("AnswerTimeoutError") == 1
+    assert "Check power, cable, baud rate and parity, and the mode." in text
+
+
+def test_an_axis_that_has_stopped_and_does_not_say_where_is_stopped_all_the_same(
+    compax: Compax, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def position(_: SmcAxis) -> float:
+        raise AnswerTimeoutError("no answer")
+
+    monkeypatch.setattr(SmcAxis, "position", position)
+    assert compax("stop", BUS, "X") == (0, "axis X has acknowledged the stop, and stands")
+
+
+def test_ctrl_c_after_the_end_says_how_it_had_ended(
+    compax: Compax, on_stage: Plan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def position(_: AxisOnLine) -> float:
+        ctrl_c()
+        await asyncio.sleep(1)
+        return 0.0
+
+    monkeypatch.setattr("compax_aio.cli.stepping.line.AxisOnLine.position", position)
+    monkeypatch.setattr("compax_aio.cli.moving._follow", _no_readings)
+    code, text = compax("move", BUS, "X", "200")
+    assert code == 130
+    assert "Interrupted. sim://smc axis X: 200.00 steps reached before." in text
+    code, text = compax("run", BUS, "X", "200", "--for", "1")
+    assert code == 130
+    assert "Interrupted. sim://smc axis X had been stopped before, and stands." in text
+
+
+async def _no_readings(*_: object) -> None:
+    pass
 
 
 def test_one_alone_is_stopped(compax: Compax) -> None:

@@ -28,6 +28,7 @@ __all__ = [
     "following",
     "note_where_from",
     "stop_interrupted",
+    "until_ended",
     "written",
 ]
 
@@ -70,24 +71,13 @@ async def carry_out(drive: Drive, move: Move, printing: Printing) -> None:
     Raises:
         CompaxError: The move did not reach its target, or the axis could not be stopped.
     """
-    try:
-        with in_motion(drive.name), MoveView(drive, move, printing) as view:
-            async with following(drive, view):
-                result = await move
-    except asyncio.CancelledError:
-        move.cancel()  # where it was not awaited yet
-        await stop_interrupted(drive, printing, was_sent=move.is_on_wire)
-        raise
-    target = "machine zero" if result.target is None else written(drive, result.target)
-    say_at_end(f"Interrupted. {drive.name} had reached {target} before.")
-    position = None
-    with suppress(CompaxError):
-        position = await drive.position()
-    _show_result(drive, result, target, position, printing)
 
+    def target(result: MoveResult) -> str:
+        return "machine zero" if result.target is None else written(drive, result.target)
 
-def _show_result(drive: Drive, result: MoveResult, target: str, position: float | None, printing: Printing) -> None:
-    standing = "; its position could not be read" if position is None else f"; it stands at {written(drive, position)}"
+    result, position, standing = await until_ended(
+        drive, move, printing, lambda result: f"{drive.name} had reached {target(result)}"
+    )
     printing.show(
         {
             "drive": result.drive,
@@ -98,9 +88,45 @@ def _show_result(drive: Drive, result: MoveResult, target: str, position: float 
             "position": position,
             "unit": drive.unit,
         },
-        f"{drive.name}: {target} reached in {result.duration_s:.2f} s, confirmed "
+        f"{drive.name}: {target(result)} reached in {result.duration_s:.2f} s, confirmed "
         f"{_CONFIRMATIONS[result.confirmed_by]}{standing}",
     )
+
+
+async def until_ended(
+    axis: MovedAxis, move: MoveFuture, printing: Printing, told: Callable[[MoveResult], str]
+) -> tuple[MoveResult, float | None, str]:
+    """
+    Await *move* under a progress bar, and look where the axis stands then.
+
+    Where the program is interrupted meanwhile, the axis is stopped, and that is said.
+
+    Args:
+        axis: What moves.
+        move: The move.
+        printing: How it is said.
+        told: How it had ended, for who interrupts the program after that: ``x had reached 20 mm``.
+
+    Returns:
+        Its result; the position, None where it could not be read; and that in words.
+
+    Raises:
+        CompaxError: The move did not reach its target, or the axis could not be stopped.
+    """
+    try:
+        with in_motion(axis.name), MoveView(axis, move, printing) as view:
+            async with following(axis, view):
+                result = await move
+    except asyncio.CancelledError:
+        move.cancel()  # where it was not awaited yet
+        await stop_interrupted(axis, printing, was_sent=move.is_on_wire)
+        raise
+    say_at_end(f"Interrupted. {told(result)} before.")
+    position = None
+    with suppress(CompaxError):
+        position = await axis.position()
+    standing = "; its position could not be read" if position is None else f"; it stands at {written(axis, position)}"
+    return result, position, standing
 
 
 # Ctrl-C -------------------------------------------------------------------------------------------------------------

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +13,7 @@ from cyclopts import Parameter
 import compax_aio
 from compax_aio import CompaxError, Drive, DriveSettings, InvalidCommandError
 
-__all__ = ["DriveLine", "Url"]
+__all__ = ["DriveLine", "Url", "closing"]
 
 Url = Annotated[
     str,
@@ -21,6 +21,25 @@ Url = Annotated[
         help="Line of the drive: serial:///dev/ttyUSB0?baudrate=9600, tcp://192.168.1.50:4001, sim://compax …",
     ),
 ]
+
+
+@asynccontextmanager
+async def closing(close: Callable[[], Awaitable[None]]) -> AsyncIterator[None]:
+    """
+    Call *close*, which stops and closes, as the block is left.
+
+    A block that fails raises its own error, with a note if something could not be stopped as it was left.
+    """
+    try:
+        yield
+    except CompaxError as error:
+        try:
+            await close()
+        except CompaxError as on_leaving:
+            error.add_note(f"as the line was closed: {on_leaving}")
+        raise
+    finally:
+        await close()  # where it is closed already, nothing happens
 
 
 @Parameter(name="*")
@@ -45,16 +64,8 @@ class DriveLine:
         settings = self.drive_settings()
         async with self.recorded():
             drive = await compax_aio.connect(url, name=self.name, settings=settings)
-            try:
+            async with closing(drive.close):
                 yield drive
-            except CompaxError as error:
-                try:
-                    await drive.close()
-                except CompaxError as on_leaving:
-                    error.add_note(f"as the line was closed: {on_leaving}")
-                raise
-            finally:
-                await drive.close()
 
     @asynccontextmanager
     async def recorded(self) -> AsyncIterator[None]:

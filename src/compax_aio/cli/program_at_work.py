@@ -9,7 +9,14 @@ from typing import Annotated
 from cyclopts import Parameter
 from rich.progress import Progress, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn
 
-from compax_aio import Drive, InvalidCommandError, MoveTimeoutError
+from compax_aio import (
+    AnswerTimeoutError,
+    ConnectionLostError,
+    Drive,
+    InvalidCommandError,
+    MoveInDoubtError,
+    MoveTimeoutError,
+)
 from compax_aio.compax.moves import check_manner
 from compax_aio.compax.program_run import check_record_number
 
@@ -87,6 +94,14 @@ async def _watch(drive: Drive, timeout_s: float | None, printing: Printing) -> N
                 await drive.program.stop()
                 error.add_note(f"{drive.name} was stopped, and stands{_STOPPED}.")
                 raise
+            except (AnswerTimeoutError, ConnectionLostError) as error:
+                raise MoveInDoubtError(
+                    f"what became of its program is in doubt: {error.what}",
+                    device=drive.name,
+                    sent=error.sent,
+                    hint="it may run, and move the axis; look at the machine",
+                    exchanges=error.exchanges,
+                ) from error
 
 
 class RunView:

@@ -27,7 +27,7 @@ from .interruption import in_motion, say_at_end
 from .monitoring.wanted import WantedAxis, wanted_axes
 from .moving import stop_interrupted, written
 from .number_words import NUMBER
-from .opening import DriveLine
+from .opening import DriveLine, closing
 from .printing import Printing, notes_console
 
 __all__ = ["record"]
@@ -155,7 +155,7 @@ def _ending(
 async def _connected(axes: tuple[WantedAxis, ...]) -> AsyncIterator[dict[str, Drive]]:
     """Connect to all drives at once."""
     urls, settings = {axis.name: axis.url for axis in axes}, {axis.name: axis.settings for axis in axes}
-    async with DriveGroup.connect(urls, settings=settings) as group:
+    async with DriveGroup.connect(urls, settings=settings) as group, closing(group.close):
         yield group.drives
 
 

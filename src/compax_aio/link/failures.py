@@ -45,7 +45,7 @@ class Failures:
     def timeout(self, exchange: Exchange) -> AnswerTimeoutError:
         """Say that one line was not answered in time."""
         return AnswerTimeoutError(
-            self._not_in_time,
+            self._not_in_time(exchange),
             device=self._name,
             sent=exchange.text,
             received=exchange.received,
@@ -75,7 +75,7 @@ class Failures:
         if exchange is None:
             what = "nothing was sent"
         elif exchange.is_late:
-            what, sent, received = self._not_in_time, exchange.text, exchange.received
+            what, sent, received = self._not_in_time(exchange), exchange.text, exchange.received
         elif exchange.times_ahead:
             what = f"sent {exchange.times_ahead} times, and nothing shows whether it was understood"
             sent, received = exchange.text, self._history.received_since_sent()
@@ -128,9 +128,12 @@ class Failures:
             what += f", and {exchange.text!r} was not sent"
         if hint is not None and comes_back:
             hint = (
-                "the line is tried again all the while; a drive that was moving may go on, and shows it when it is back"
+                "the line is tried again while it is open; a drive that was moving may go on, and shows it when it is "
+                "back"
             )
-        if hint is not None and not self._history.has_received:
+        if hint is not None and isinstance(cause, CompaxError) and cause.hint:
+            hint = f"{cause.hint}{'' if cause.hint.endswith('?') else ';'} {hint}"
+        elif hint is not None and not self._history.has_received:
             hint = f"it has said nothing yet: is somebody else connected to that port already? {hint}"
         if hold is not None:
             hint = f"{hold.why}: look at the machine, and switch the device off and on before you connect again"
@@ -138,9 +141,9 @@ class Failures:
         error.__cause__ = cause
         return error
 
-    @property
-    def _not_in_time(self) -> str:
-        return f"no answer within {self._answer_timeout_s:g} s"
+    def _not_in_time(self, exchange: Exchange) -> str:
+        patience_s = self._answer_timeout_s if exchange.patience_s is None else exchange.patience_s
+        return f"no answer within {patience_s:.3g} s"
 
 
 def _reason(cause: Exception) -> str:

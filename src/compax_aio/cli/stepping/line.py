@@ -10,13 +10,13 @@ from typing import Annotated, Final, Literal
 
 from cyclopts import Parameter
 
-from compax_aio import CompaxError, InvalidCommandError, smc
+from compax_aio import InvalidCommandError, smc
 from compax_aio.smc.facts import NO_NAME
 from compax_aio.smc.vocabulary import check_name
 
 from ..moving import MovedSettings
 from ..number_words import NUMBER
-from ..opening import DriveLine
+from ..opening import DriveLine, closing
 
 __all__ = ["THE_ONLY", "AxisName", "AxisOnLine", "LineUrl", "SmcLine"]
 
@@ -88,18 +88,10 @@ class SmcLine:
         asked = tuple(axes) if self.mode == "party" else ()
         async with DriveLine(trace=self.trace).recorded():
             line = await smc.connect(url, mode=self.mode, axes=asked, name=self.name, settings=settings)
-            try:
+            async with closing(line.close):
                 for axis in axes:
                     _expect(line, axis)
                 yield line
-            except CompaxError as error:
-                try:
-                    await line.close()
-                except CompaxError as on_leaving:
-                    error.add_note(f"as the line was closed: {on_leaving}")
-                raise
-            finally:
-                await line.close()
 
     @asynccontextmanager
     async def open_axis(self, url: str, axis: str) -> AsyncIterator[AxisOnLine]:

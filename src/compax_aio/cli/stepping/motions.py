@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import asyncio
-from contextlib import suppress
 from typing import Annotated, Final, Literal
 
 from cyclopts import Parameter
 
-from compax_aio import CompaxError
+from compax_aio import MoveResult
 from compax_aio.smc import AxisMove
 from compax_aio.smc.vocabulary import plan_home, plan_move_by, plan_move_to, plan_run
 
 from ...motion.moves import check_manner
-from ..interruption import in_motion
-from ..moving import MoveView, TimeoutS, following, stop_interrupted, written
+from ..interruption import in_motion, say_at_end
+from ..moving import MoveView, TimeoutS, following, stop_interrupted, until_ended, written
 from ..number_words import NUMBER, WHOLE
 from ..printing import Printing
 from .line import AxisName, AxisOnLine, LineUrl, SmcLine
@@ -133,6 +132,7 @@ async def run(
             going.cancel()
             await stop_interrupted(moved, printing, was_sent=going.is_on_wire)
             raise
+        say_at_end(f"Interrupted. {moved.name} had been stopped before, and stands.")
         position = await moved.position()
     printing.show(
         {"axis": moved.name, "speed_steps_s": speed, "position": position, "unit": moved.unit},
@@ -149,19 +149,13 @@ async def carry_out(moved: AxisOnLine, move: AxisMove, printing: Printing, *, wh
     Raises:
         CompaxError: The move did not reach its target, or the axis could not be stopped.
     """
-    try:
-        with in_motion(moved.name), MoveView(moved, move, printing) as view:
-            async with following(moved, view):
-                result = await move
-    except asyncio.CancelledError:
-        move.cancel()  # where it was not awaited yet
-        await stop_interrupted(moved, printing, was_sent=move.is_on_wire)
-        raise
-    position = None
-    with suppress(CompaxError):
-        position = await moved.position()
-    reached = what or f"{'home' if result.target is None else written(moved, result.target)} reached"
-    standing = "; its position could not be read" if position is None else f"; it stands at {written(moved, position)}"
+
+    def reached(result: MoveResult) -> str:
+        return what or f"{'home' if result.target is None else written(moved, result.target)} reached"
+
+    result, position, standing = await until_ended(
+        moved, move, printing, lambda result: f"{moved.name}: {reached(result)}"
+    )
     printing.show(
         {
             "axis": moved.name,
@@ -171,5 +165,5 @@ async def carry_out(moved: AxisOnLine, move: AxisMove, printing: Printing, *, wh
             "position": position,
             "unit": moved.unit,
         },
-        f"{moved.name}: {reached} in {result.duration_s:.2f} s, {_CONFIRMED}{standing}",
+        f"{moved.name}: {reached(result)} in {result.duration_s:.2f} s, {_CONFIRMED}{standing}",
     )

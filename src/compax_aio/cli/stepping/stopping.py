@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping
+from contextlib import asynccontextmanager, suppress
 from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from compax_aio import CompaxError
+from compax_aio import AnswerTimeoutError, CompaxError, UnexpectedAnswerError
 from compax_aio.smc import PartyLine
 from compax_aio.smc.facts import POSSIBLE_NAMES
 
 from ..exit_codes import OK, exit_code_of
+from ..interruption import say_at_end
 from ..printing import Printing, tell_error
 from ..progress import counting
+from ..stops_under_way import let_end
 from .line import LineUrl, SmcLine
 
 __all__ = ["stop"]
@@ -43,10 +47,17 @@ async def stop(
     ```
     """
     named = tuple(dict.fromkeys(line.check(each) for each in axes))
-    async with line.open(url) as party:  # asks nobody: an axis that is missing keeps no other from being stopped
-        if abort:
-            return await _abort(party, named, printing)
-        return await (_stop_named(party, named, printing) if named else _stop_found(party, printing))
+    code = OK
+    try:
+        async with line.open(url) as party:  # asks nobody: an axis that is missing keeps no other from being stopped
+            if abort:
+                code = await _abort(party, named, printing)
+            else:
+                code = await (_stop_named(party, named, printing) if named else _stop_found(party, printing))
+    except CompaxError:
+        if code == OK:
+            raise  # else it has been told already, and was tried in vain once more as the line was closed
+    return code
 
 
 async def _abort(party: PartyLine, named: tuple[str, ...], printing: Printing) -> int:
@@ -67,8 +78,10 @@ async def _abort(party: PartyLine, named: tuple[str, ...], printing: Printing) -
 
 
 async def _stop_named(party: PartyLine, named: tuple[str, ...], printing: Printing) -> int:
-    stops = [_stop_one(party, each, printing) for each in named]
-    return _shown(dict(zip(named, await asyncio.gather(*stops), strict=True)), printing)
+    stops = {each: asyncio.ensure_future(_stop_one(party, each, printing)) for each in named}
+    async with _let_end_if_interrupted(party, stops):
+        await asyncio.wait(stops.values())
+    return _shown({name: task.result() for name, task in stops.items()}, printing)
 
 
 async def _stop_found(party: PartyLine, printing: Printing) -> int:
@@ -82,25 +95,51 @@ async def _stop_found(party: PartyLine, printing: Printing) -> int:
     for each in tuple(party.axes):  # of a chain, or the only one
         stop_it(each)
     if not stops:
-        done = 0
-        with counting("asking names", printing) as on_progress:
-
-            def on_each(name: str, is_there: bool) -> None:
-                nonlocal done
-                done += 1
-                on_progress(done, len(POSSIBLE_NAMES))
-                if is_there:
-                    stop_it(name)
-
-            try:
-                await party.scan(on_each=on_each)
-            finally:
-                await asyncio.gather(*stops.values())
-    outcomes = {name: await task for name, task in stops.items()}
+        async with _let_end_if_interrupted(party, stops, also=" Not every name had been asked."):
+            await _find(party, stop_it, stops, printing)
+    async with _let_end_if_interrupted(party, stops):
+        outcomes = {name: await asyncio.shield(task) for name, task in stops.items()}
     if not outcomes:
         printing.show({"stopped": []}, "no axis answers, so none was stopped")
         return 4
     return _shown(outcomes, printing)
+
+
+async def _find(
+    party: PartyLine, stop_it: Callable[[str], None], stops: Mapping[str, asyncio.Task[Any]], printing: Printing
+) -> None:
+    done = 0
+    with counting("asking names", printing) as on_progress:
+
+        def on_each(name: str, is_there: bool) -> None:
+            nonlocal done
+            done += 1
+            on_progress(done, len(POSSIBLE_NAMES))
+            if is_there:
+                stop_it(name)
+
+        try:
+            await party.scan(on_each=on_each)
+        except CompaxError:
+            await asyncio.gather(*stops.values())
+            raise
+
+
+@asynccontextmanager
+async def _let_end_if_interrupted(
+    party: PartyLine, stops: Mapping[str, asyncio.Task[CompaxError | None]], *, also: str = ""
+) -> AsyncIterator[None]:
+    """Let stops that have begun come to their end although the command is interrupted, and say how they ended."""
+    try:
+        yield
+    except asyncio.CancelledError:
+        unknown = await let_end(stops, party.settings.standstill_timeout_s, lambda error: error is None)
+        if unknown:
+            told = f"Whether these stand is not known, look at them: {_list(unknown)}."
+        else:
+            told = f"Acknowledged the stop, and stand: {_list(stops)}." if stops else "No axis was stopped."
+        say_at_end(f"Interrupted. {told}{also}")
+        raise
 
 
 async def _stop_one(party: PartyLine, name: str, printing: Printing) -> CompaxError | None:
@@ -109,13 +148,17 @@ async def _stop_one(party: PartyLine, name: str, printing: Printing) -> CompaxEr
     called = f"axis {name}" if name else "the axis"
     try:
         await axis.stop()
-        position = await axis.position()
     except CompaxError as error:
+        if isinstance(error, AnswerTimeoutError | UnexpectedAnswerError):
+            error.add_note("Check power, cable, baud rate and parity, and the mode.")
         if not printing.json:
             tell_error(error, as_document=False)
         return error
+    where = ""
+    with suppress(CompaxError):
+        where = f" at {await axis.position():g} steps"
     if not printing.json:
-        printing.show(None, f"{called} has acknowledged the stop, and stands at {position:g} steps")
+        printing.show(None, f"{called} has acknowledged the stop, and stands{where}")
     return None
 
 
@@ -129,5 +172,5 @@ def _shown(outcomes: dict[str, CompaxError | None], printing: Printing) -> int:
     return next((exit_code_of(error) for error in outcomes.values() if error is not None), OK)
 
 
-def _list(names: tuple[str, ...]) -> str:
+def _list(names: Iterable[str]) -> str:
     return ", ".join(f"axis {each}" if each else "the axis" for each in names)
