@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
+from typing import Final
 
 from compax_aio.camm1.facts.handshakes import OutputKind, xon_when_stored
 from compax_aio.camm1.facts.instructions import DEFAULT_BLOCK_SIZE
 from compax_aio.camm1.facts.line import ACK, DC1, DC3, ENQ
 
 from .buffer import Buffer
-from .knobs import Knobs
 from .log import LogKind
+from .surroundings import Surroundings
 from .transmitter import Transmitter
 from .trouble import Trouble
 from .wire import Wire
 
 __all__ = ["Handshakes", "string_of"]
 
-_SMALL_BUFFER_PART = 4
+_SMALL_BUFFER_PART: Final = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,13 +39,11 @@ class Handshakes:
     All handshakes of one cutter; what is stored and free is its buffer's.
 
     Args:
-        knobs: Of the cutter.
+        around: Of the cutter.
         buffer: Its data buffer.
         wire: From the host; stopped and let go by DTR, if that is wired.
         transmitter: To the host.
         trouble: Which Xon are lost.
-        note: Called with what is done.
-        on_error: Called with the number of an error for ``.E``.
 
     Attributes:
         logical_bytes: What the buffer says it holds; ``.@`` may set it.
@@ -56,22 +55,14 @@ class Handshakes:
     """
 
     def __init__(
-        self,
-        knobs: Knobs,
-        buffer: Buffer,
-        wire: Wire,
-        transmitter: Transmitter,
-        trouble: Trouble,
-        note: Callable[[float, LogKind, str], None],
-        on_error: Callable[[int], None],
+        self, around: Surroundings, buffer: Buffer, wire: Wire, transmitter: Transmitter, trouble: Trouble
     ) -> None:
-        self._knobs = knobs
+        self._around = around
+        self._knobs = knobs = around.knobs
         self._buffer = buffer
         self._wire = wire
         self._transmitter = transmitter
         self._trouble = trouble
-        self._note = note
-        self._error = on_error
         self.logical_bytes = knobs.logical_bytes
         self.is_dtr_high = True
         self.power_on()
@@ -190,7 +181,7 @@ class Handshakes:
             if is_due or (self.is_stopped and self._until_repeat() < 0):
                 self.is_stopped = True
                 self._since_xoff = 0
-                self._note(now, LogKind.HANDSHAKE, "Xoff")
+                self._around.note(LogKind.HANDSHAKE, "Xoff", now)
                 self._transmitter.send(self.string, OutputKind.XON_XOFF, now)
         if self.is_dtr_high:
             if self.dtr_follows and self.free < self._dtr_low_below:
@@ -205,7 +196,7 @@ class Handshakes:
             if stored <= xon_when_stored(self._knobs.xon, self.logical_bytes, self._rule.block):
                 self.is_stopped = False
                 if not self._trouble.loses_xon():
-                    self._note(now, LogKind.HANDSHAKE, "Xon")
+                    self._around.note(LogKind.HANDSHAKE, "Xon", now)
                     self._transmitter.send(self._rule.answer, OutputKind.XON_XOFF, now, turns=self._knobs.delay_on_xon)
         if self.owes_ack and self._has_room:
             self.owes_ack = False
@@ -219,17 +210,17 @@ class Handshakes:
         """Take an ENQ."""
         rule = self._rule
         if rule.mode == "dummy":
-            self._note(now, LogKind.ENQUIRY, "answered")
+            self._around.note(LogKind.ENQUIRY, "answered", now)
             self._transmitter.send(rule.answer, OutputKind.DUMMY_ACK, now)
             return
         if self.owes_ack or self._transmitter.is_busy(now):
-            self._error(10)
+            self._around.fail(10)
             return
         if self.string:
-            self._note(now, LogKind.HANDSHAKE, "immediate")
+            self._around.note(LogKind.HANDSHAKE, "immediate", now)
             self._transmitter.send(self.string, self._kind, now)
         has_room = self._has_room
-        self._note(now, LogKind.ENQUIRY, "answered" if has_room else "pending")
+        self._around.note(LogKind.ENQUIRY, "answered" if has_room else "pending", now)
         if has_room:
             self._acknowledge(now)
         else:
@@ -245,12 +236,12 @@ class Handshakes:
         return self.free >= block if self._knobs.acknowledges_equal else self.free > block
 
     def _acknowledge(self, now: float) -> None:
-        self._note(now, LogKind.HANDSHAKE, "ACK")
+        self._around.note(LogKind.HANDSHAKE, "ACK", now)
         self._transmitter.send(self._rule.answer, self._kind, now)
 
     def _set_line(self, is_high: bool, now: float) -> None:
         self.is_dtr_high = is_high
-        self._note(now, LogKind.HANDSHAKE, "DTR high" if is_high else "DTR low")
+        self._around.note(LogKind.HANDSHAKE, "DTR high" if is_high else "DTR low", now)
         if not self._knobs.dtr_wired:
             return
         if is_high:

@@ -91,21 +91,15 @@ class Reader:
     def _name(self, data: bytearray, begin: int, calls_mode_2: bool) -> str | None:
         """Return the name at *begin*, empty if there is none; None: it has not come whole."""
         head = data[begin : begin + 3].decode("latin-1").upper()
-        if not head:
-            return None
-        if head[0] == "!":
+        if head[:1] == "!":
             return head if len(head) == 3 else None
-        if not ("A" <= head[0] <= "Z"):
+        if head and not "A" <= head[0] <= "Z":
             return ""
-        if len(head) == 1:
+        if len(head) < 2:
             return None
         two = head[:2]
-        if self._has_mode_2 or calls_mode_2:
-            if two in MODE_2:
-                return two
-            if calls_mode_2 or not (self._has_mode_1 and head[0] in MODE_1):
-                return two if two.isalpha() else head[0]
-        return head[0]
+        is_two = two in MODE_2 if self._has_mode_1 and head[0] in MODE_1 and not calls_mode_2 else two.isalpha()
+        return two if is_two and (self._has_mode_2 or calls_mode_2) else head[0]
 
     def _whole(self, data: bytearray, name: str, begin: int) -> Stored | None:
         row = mnemonic_of(name)

@@ -1,23 +1,21 @@
-"""The far side of the buffer: reads whole instructions, carries them out in time, and keeps what was cut."""
+"""The far side of the buffer: reads whole instructions, and carries them out in time."""
 
 from __future__ import annotations
 
-from math import hypot, inf
+from math import inf
 from typing import Final, Protocol
 
-from compax_aio.camm1.facts.line import MAX_COORDINATE
 from compax_aio.camm1.facts.reports import OUTPUT_INSTRUCTIONS
 
+from .blade import Blade
 from .buffer import Buffer
-from .cuttings import Cuttings
-from .interpreter import Interpreter, Step, Stop
-from .knobs import Knobs
+from .interpreter import Interpreter
 from .language import NOTHING, Reader, Stored
-from .log import Log, LogKind
-from .shapes import clipped
+from .log import LogKind
+from .surroundings import Surroundings
+from .tool import Step, Stop, Tool
 
 __all__ = ["Machine", "Watcher"]
-
 
 _STOPPING: Final = frozenset({"!NR", "NR"})
 
@@ -37,69 +35,62 @@ class Machine:
     Reads one instruction ahead while a vector is made; what moves nothing is carried out when it is read.
 
     Args:
-        knobs: Of the cutter.
+        around: Of the cutter.
         buffer: Where it reads.
-        log: Where it notes what it does.
         watcher: Is told of free bytes and of output instructions.
 
     Attributes:
-        cuttings: What lies on the machine.
-        interpreter: The state of the tool.
+        blade: Makes the vectors.
+        tool: The state that instructions change.
         is_ready: SETUP is lit.
         is_paused: By the PAUSE key.
         is_viewed: By the VIEW key of an HP.
         is_lever_up: The sheet is not held.
         is_blinking: There was an error in the data.
-        has_drawn: Something was cut since power-on.
         data_error: For ``OE``.
-        factor: Everything takes so many times as long.
     """
 
-    def __init__(self, knobs: Knobs, buffer: Buffer, log: Log, watcher: Watcher) -> None:
+    def __init__(self, around: Surroundings, buffer: Buffer, watcher: Watcher) -> None:
+        knobs = around.knobs
+        self._around = around
         self._knobs = knobs
         self._buffer = buffer
-        self._log = log
         self._watcher = watcher
-        self._now = 0.0
-        self.cuttings = Cuttings()
-        self.factor = knobs.time_factor
-        self._frees_at_end = knobs.free_on == "finish"
-        self._behind_motion = _STOPPING | (
-            frozenset(OUTPUT_INSTRUCTIONS) if knobs.o_answers == "motion" else frozenset()
-        )
-        self._edge = (knobs.area_x or MAX_COORDINATE, knobs.area_y or MAX_COORDINATE)
         self._is_interrupted = False
-        self.is_paused = self.is_viewed = self.is_lever_up = False
+        asking = frozenset(OUTPUT_INSTRUCTIONS) if knobs.o_answers == "motion" else frozenset()
+        self._behind_motion = _STOPPING | asking
+        self.blade = Blade(knobs)
+        self.is_viewed = self.is_lever_up = False
+        self._now = 0.0
         self.switch_on()
 
     def switch_on(self) -> None:
         """Begin anew, with the tool at the origin."""
-        knobs = self._knobs
+        knobs, facts = self._knobs, self._knobs.facts
+        self.tool = Tool(knobs, self._on_error)
         self._reader = Reader(knobs.language)
-        names = knobs.facts.mnemonics.value or frozenset()
-        known = {each for each in (knobs.facts.force_instruction.value, knobs.facts.tool_instruction.value) if each}
-        self.interpreter = Interpreter(
-            self._reader, names | known, knobs.speed_cm_s, knobs.travel_cm_s, knobs.speeds_cm_s, self._on_error
-        )
+        own = (facts.force_instruction.value, facts.tool_instruction.value)
+        names = (facts.mnemonics.value or frozenset()).union(each for each in own if each)
+        self._interpreter = Interpreter(self.tool, self._reader, names)
         self.is_ready = knobs.ready
-        self.is_blinking = self.has_drawn = False
+        self.is_paused = self.is_blinking = self.blade.has_drawn = False
         self.data_error = 0
+        self._motion: Step | None = None
+        self._waiting: Step | None = None
+        self._begun_at = self._ends_at = self._reads_at = self._now
+        self._left_s = 0.0
+        self._text = ""
         self._next: Stored | None = None
         self._seen = -1
-        self._motion: Step | None = None
-        self._begun_at = self._ends_at = self._reads_at = self._now
-        self._waiting: Step | None = None
-        self._left_s = 0.0
-        self._vectors_before = 0
-        self._text = ""
-        self.cuttings.vectors.carry(0, 0)
+        self.blade.cuttings.vectors.carry(0, 0)
 
     def switch_off(self, now: float) -> None:
         """Stop where the tool is; what was not cut yet is not cut."""
         if self._motion is not None:
-            self._cut_short(self._motion, now)
+            self.blade.cut_short(self._motion, self._elapsed_s(self._motion, now))
         self._motion = self._waiting = None
         self.is_ready = False
+        self._now = now
 
     @property
     def stands_still(self) -> bool:
@@ -134,7 +125,8 @@ class Machine:
         if was_still:
             self._reads_at = max(self._reads_at, now)
             self._ends_at = now + self._left_s
-            self._begun_at = self._ends_at - self._duration_s(self._motion) if self._motion is not None else now
+            if self._motion is not None:
+                self._begun_at = self._ends_at - self.blade.duration_s(self._motion)
         elif self._motion is not None:
             self._left_s = max(0.0, self._ends_at - now)
 
@@ -162,6 +154,18 @@ class Machine:
         self._now = max(self._now, until)
         return until
 
+    def position_at(self, now: float) -> Stop:
+        """Return where the tool is, and whether it is down."""
+        step = self._motion
+        if step is None:
+            return self.tool.x, self.tool.y, self.tool.is_down
+        return self.blade.reached(step, self._elapsed_s(step, now))[1]
+
+    def _elapsed_s(self, step: Step, now: float) -> float:
+        return self.blade.duration_s(step) - self._left_s if self.stands_still else now - self._begun_at
+
+    # Reading
+
     def _reads_next_at(self) -> float:
         """Return when the next instruction is read; infinite if none has come whole."""
         buffer = self._buffer
@@ -181,14 +185,13 @@ class Machine:
 
     def forget_next(self) -> None:
         """Look anew at what is stored: it was changed."""
-        self._next, self._seen = None, -1
-
-    # Instructions
+        self._next = None
+        self._seen = -1
 
     def _read(self, now: float) -> None:
-        stored, self._next = self._next, None
+        stored = self._next
         assert stored is not None
-        self._seen = -1
+        self.forget_next()
         self._now = now
         counted = self._buffer.read(stored.size)
         if stored.name == NOTHING:
@@ -196,163 +199,69 @@ class Machine:
             return
         self._text = stored.name + stored.argument[:40].decode("latin-1")
         was_still = self.stands_still
-        step = self.interpreter.carry_out(stored)
-        self._log.add(now, LogKind.INSTRUCTION, step.text)
+        step = self._interpreter.carry_out(stored)
+        self._around.note(LogKind.INSTRUCTION, step.text, now)
         if step.stops:
-            if self._frees_at_end:
-                step.counted = counted
-            else:
-                self._free(counted, now)
-            if self._motion is None:
-                self._begin(step, now)
-            else:
-                self._waiting = step
+            self._take_up(step, counted, now)
         else:
-            self._reads_at = now + self._knobs.instruction_time_s * self.factor
-            self._note(step)
+            self._reads_at = now + self._knobs.instruction_time_s * self.blade.factor
+            self._carry_out(step)
             self._free(counted, now)
-            if step.name in _STOPPING:
-                self.is_ready = False
-            elif step.name == "IN":
-                self.data_error = 0
-            elif step.asks:
-                self._watcher.asked(step.name, now)
         self.held(was_still, now)
+
+    def _carry_out(self, step: Step) -> None:
+        """Do what moves nothing."""
+        self.blade.leave(step, self.tool.window)
+        if step.name in _STOPPING:
+            self.is_ready = False
+        elif step.name == "IN":
+            self.data_error = 0
+        elif step.asks:
+            self._watcher.asked(step.name, self._now)
 
     def _free(self, count: int, now: float) -> None:
         self._buffer.stored -= count
         if self._watcher.freed(now):
             self._is_interrupted = True
 
+    # Motion
+
+    def _take_up(self, step: Step, counted: int, now: float) -> None:
+        """Begin a motion, or let it wait for the end of the one before."""
+        if self._motion is None:
+            self._begin(step, now)
+        else:
+            self._waiting = step
+        if self._knobs.free_on == "finish":
+            step.counted = counted
+        else:
+            self._free(counted, now)
+
     def _begin(self, step: Step, now: float) -> None:
         self._motion = step
         self._begun_at = now
-        self._ends_at = now + self._duration_s(step)
+        self._ends_at = now + self.blade.duration_s(step)
         self._reads_at = max(self._reads_at, now)
-        self._vectors_before = self.cuttings.vectors.total
-        self._note(step)
+        self.blade.leave(step, self.tool.window)
 
     def _end_motion(self) -> None:
         step, self._motion = self._motion, None
         now = self._now = self._ends_at
-        assert step is not None
-        if step.counted:
-            self._free(step.counted, now)
         waiting, self._waiting = self._waiting, None
         if waiting is not None:
             self._begin(waiting, now)
+        if step is not None and step.counted:
+            self._free(step.counted, now)
 
     def drop_waiting(self) -> None:
-        """Forget the instruction that was read and not begun."""
+        """Forget the instruction that was read and not begun; what is carried out holds no bytes any more."""
         if self._waiting is not None:
-            self.interpreter.take_back(self._waiting)
+            self.tool.take_back(self._waiting)
             self._waiting = None
-
-    def uncount(self) -> None:
-        """Let no instruction that is carried out hold bytes of the buffer any more."""
         if self._motion is not None:
             self._motion.counted = 0
 
     def _on_error(self, code: int) -> None:
         self.data_error = code
         self.is_blinking = True
-        self._log.add(self._now, LogKind.DATA_ERROR, f"{code} {self._text}")
-
-    # Vectors
-
-    def _duration_s(self, step: Step) -> float:
-        return sum(self._durations_s(step)) * self.factor
-
-    def _durations_s(self, step: Step) -> list[float]:
-        x, y, _ = step.begins
-        each_s = self._knobs.vector_time_s
-        travel, speed = step.speeds
-        durations = []
-        for to_x, to_y, is_down in step.stops:
-            durations.append(hypot(to_x - x, to_y - y) / (speed if is_down else travel) + each_s)
-            x, y = to_x, to_y
-        return durations
-
-    def _note(self, step: Step) -> None:
-        """Keep what a step leaves behind."""
-        if step.mark is not None:
-            self.cuttings.mark(*step.mark, step.begins[0], step.begins[1])
-        if not step.stops:
-            return
-        low, high = self._window
-        x, y, _ = step.begins
-        for to_x, to_y, is_down in step.stops:
-            self._vector((x, y), (to_x, to_y), is_down, step.state, low, high)
-            x, y = to_x, to_y
-
-    @property
-    def _window(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        window = self.interpreter.window
-        if window is None:
-            return (0.0, 0.0), self._edge
-        low = (max(0.0, window[0]), max(0.0, window[1]))
-        return low, (min(self._edge[0], window[2]), min(self._edge[1], window[3]))
-
-    def _vector(
-        self,
-        begin: tuple[float, float],
-        end: tuple[float, float],
-        is_down: bool,
-        state: int,
-        low: tuple[float, float],
-        high: tuple[float, float],
-    ) -> None:
-        move = self.cuttings.vectors.move
-        if not is_down:
-            move(int(end[0]), int(end[1]), state)
-            return
-        self.has_drawn = True
-        if all(low[axis] <= place[axis] <= high[axis] for place in (begin, end) for axis in (0, 1)):
-            move(int(end[0]), int(end[1]), state | 1)
-            return
-        part = clipped(begin, end, low, high)
-        if part is not None:
-            first, last = ((round(x), round(y)) for x, y in part)
-            if first != begin:
-                move(*first, state)
-            move(*last, state | 1)
-            if last != end:
-                move(int(end[0]), int(end[1]), state)
-        else:
-            move(int(end[0]), int(end[1]), state)
-
-    def position_at(self, now: float) -> Stop:
-        """Return where the tool is, and whether it is down."""
-        step = self._motion
-        if step is None:
-            tool = self.interpreter
-            return tool.x, tool.y, tool.is_down
-        elapsed_s = self._duration_s(step) - self._left_s if self.stands_still else now - self._begun_at
-        return self._reached(step, elapsed_s)[1]
-
-    def _reached(self, step: Step, elapsed_s: float) -> tuple[int, Stop]:
-        """Return how many vectors of a step are whole after that time, and where the tool is."""
-        x, y, was_down = step.begins
-        for count, ((to_x, to_y, is_down), lasts_s) in enumerate(zip(step.stops, self._durations_s(step), strict=True)):
-            lasts_s *= self.factor  # noqa: PLW2901
-            if elapsed_s < lasts_s:
-                part = elapsed_s / lasts_s
-                return count, (x + part * (to_x - x), y + part * (to_y - y), is_down)
-            elapsed_s -= lasts_s
-            x, y, was_down = to_x, to_y, is_down
-        return len(step.stops), (x, y, was_down)
-
-    def _cut_short(self, step: Step, now: float) -> None:
-        """Take back what was not cut of the step that is carried out."""
-        elapsed_s = self._duration_s(step) - self._left_s if self.stands_still else now - self._begun_at
-        count, (x, y, is_down) = self._reached(step, elapsed_s)
-        vectors = self.cuttings.vectors
-        made = list(step.stops[:count])
-        if count < len(step.stops):
-            made.append((round(x), round(y), is_down))
-        vectors.take_back_to(self._vectors_before)
-        low, high = self._window
-        x, y, _ = step.begins
-        for to_x, to_y, is_down in made:
-            self._vector((x, y), (to_x, to_y), is_down, step.state, low, high)
-            x, y = to_x, to_y
+        self._around.note(LogKind.DATA_ERROR, f"{code} {self._text}", self._now)

@@ -7,9 +7,9 @@ from typing import Final
 from compax_aio.camm1.facts.line import MAX_COORDINATE
 from compax_aio.camm1.facts.reports import HpGlStatus, HpStatus, StatusStyle, StatusWord
 
-from .interpreter import Interpreter
 from .knobs import Knobs
 from .machine import Machine
+from .tool import Tool
 
 __all__ = ["output", "status"]
 
@@ -29,7 +29,7 @@ def status(machine: Machine, knobs: Knobs, *, is_empty: bool) -> int:
         word |= StatusWord.PAUSED
     if knobs.status is StatusStyle.WORD:
         word |= StatusWord.ALWAYS
-        if machine.has_drawn:
+        if machine.blade.has_drawn:
             word |= StatusWord.DRAWN
         if knobs.word_bit5:
             word |= StatusWord.BIT_5
@@ -38,38 +38,36 @@ def status(machine: Machine, knobs: Knobs, *, is_empty: bool) -> int:
 
 def output(name: str, machine: Machine, knobs: Knobs, now: float) -> str:
     """Return the answer to an output instruction; what it clears is cleared."""
-    tool = machine.interpreter
+    tool = machine.tool
     edge = (knobs.area_x or MAX_COORDINATE, knobs.area_y or MAX_COORDINATE)
-    match name:
-        case "OA" | "OD":
-            x, y, is_down = machine.position_at(now)
-            return f"{round(x)},{round(y)},{int(is_down)}"
-        case "OC":
-            form = ".4f" if tool.is_scaled else ".0f"
-            return f"{tool.user_x:{form}},{tool.user_y:{form}},{int(tool.is_down)}"
-        case "OE":
-            error, machine.data_error = machine.data_error, 0
-            return str(error)
-        case "OS":
-            answer = str(int(_status_byte(machine, tool)))
-            tool.initialised = False
-            return answer
-        case "OP":
-            tool.p_changed = False
-            return ",".join(f"{each:.0f}" for each in (*tool.p1, *tool.p2))
-        case "OW":
-            return ",".join(f"{each:.0f}" for each in tool.window or (0.0, 0.0, *edge))
-        case "OH":
-            return f"0,0,{edge[0]},{edge[1]}"
-        case "OF":
-            return "40,40"
-        case "OI":
-            return knobs.identity
-        case _:
-            return _OPTIONS_OF_HP if knobs.model.startswith("HP") else _OPTIONS
+    if name == "OE":
+        error, machine.data_error = machine.data_error, 0
+        return str(error)
+    if name == "OS":
+        byte = int(_status_byte(machine, tool))
+        tool.initialised = False
+        return str(byte)
+    if name == "OP":
+        tool.p_changed = False
+        return _numbers(*tool.p1, *tool.p2)
+    if name == "OC":
+        x, y = tool.user_position
+        return _numbers(x, y, form=".0f" if tool.scale is None else ".4f") + f",{tool.is_down:d}"
+    if name in {"OA", "OD"}:
+        x, y, is_down = machine.position_at(now)
+        return _numbers(x, y, is_down)
+    options = _OPTIONS_OF_HP if knobs.model.startswith("HP") else _OPTIONS
+    window = tool.window or (0, 0, *edge)
+    return {"OF": "40,40", "OI": knobs.identity, "OH": _numbers(0, 0, *edge), "OW": _numbers(*window)}.get(
+        name, options
+    )
 
 
-def _status_byte(machine: Machine, tool: Interpreter) -> HpGlStatus:
+def _numbers(*values: float, form: str = ".0f") -> str:
+    return ",".join(f"{each:{form}}" for each in values)
+
+
+def _status_byte(machine: Machine, tool: Tool) -> HpGlStatus:
     byte = HpGlStatus.READY
     if tool.is_down:
         byte |= HpGlStatus.TOOL_DOWN

@@ -106,7 +106,7 @@ class Wire:
         """Let the host send again."""
         self.is_stopped = False
         waiting, self._waiting = self._waiting, deque()
-        if 1 < len(waiting) and sum(map(len, waiting)) <= _JOINED_BYTES:
+        if len(waiting) > 1 and sum(map(len, waiting)) <= _JOINED_BYTES:
             data = b"".join(each.data[each.place : each.end] for each in waiting)
             waiting = deque([_Piece(data, 0, len(data))])
         for each in waiting:
