@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import errno
 import gc
 import os
@@ -268,6 +269,39 @@ def test_what_stands_in_the_file_is_counted_although_the_disk_was_full(
     data = b"".join(line for line in whole if line.endswith(b"\n")).count(b'"what":"received"')
     assert file.taken == (data if data < 3 else 2 if data < 5 else data - 2)
     file.close()
+
+
+@pytest.mark.parametrize("room", [*range(0, 400, 23), 400])
+def test_a_disk_with_hardly_any_room_leaves_a_trace_that_can_be_read_however_often_it_is_tried(
+    path: Path, monkeypatch: pytest.MonkeyPatch, room: int
+) -> None:
+    really = os.write
+    left = 1 << 20
+
+    def write(descriptor: int, data: Any) -> int:
+        nonlocal left
+        if not left:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        count = really(descriptor, data[:left])
+        left -= count
+        return count
+
+    monkeypatch.setattr(os, "write", write)
+    file = TraceFile(path, SMALLEST_TRACE, BEGUN)
+    file.open()
+    file.write([(0.0, "x", LineMade())])
+    taken = 0
+    for attempt in range(8):
+        left = room
+        with contextlib.suppress(OSError):
+            file.write(told(b"%d" % attempt, b"1" * 60))
+        taken += file.taken
+    left = 1 << 20
+    file.write(told(b"end"))
+    file.close()
+    assert received(path)[-1] == b"end"
+    assert len(received(path)) == taken + 1
+    assert {entry.session for entry in read_trace(path)} == {1}
 
 
 async def test_only_what_is_not_in_the_file_is_told_as_missing(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -25,7 +25,7 @@ from compax_aio.link.contract import Lane
 from compax_aio.link.taps import TAPS, Asked, Ended, Lost, Noticed, Opened, Opening, Ready, Received, Refused, Sent, Way
 from compax_aio.recording import conversations, read_trace, record_trace, trace_writing
 from compax_aio.recording.own_thread import OwnThread
-from compax_aio.recording.trace_entries import Cut, LineMade, Missing, SessionBegun, SessionEnded
+from compax_aio.recording.trace_entries import LineMade, Missing, SessionBegun, SessionEnded
 from compax_aio.recording.trace_file import TraceFile, older_file
 from compax_aio.recording.trace_writing import TraceRecorder
 
@@ -460,7 +460,7 @@ def test_a_disk_that_takes_half_of_a_batch_is_written_to_again_from_a_new_line(
     file.write([(0.3, "x", Opened())])
     file.close()
     assert [type(fact) for fact in facts(path)] == [
-        SessionBegun, LineMade, Opened, Cut, SessionBegun, LineMade, Opened,
+        SessionBegun, LineMade, Opened, SessionBegun, LineMade, Opened,
     ]  # fmt: skip
     (told,) = conversations(path)
     assert told.session == 1

@@ -155,12 +155,19 @@ class TraceFile:
         self.taken += sum(is_whole for _, is_whole in batch)
 
     def _put(self, lines: Iterable[str]) -> None:
-        data = memoryview("".join(f"{line}\n" for line in lines).encode("ascii"))
+        data = "".join(f"{line}\n" for line in lines).encode("ascii")
         assert self._descriptor is not None
-        while data:
-            written = os.write(self._descriptor, data)
-            self._bytes += written
-            data = data[written:]
+        begin, written = self._bytes, 0
+        try:
+            while written < len(data):
+                written += os.write(self._descriptor, memoryview(data)[written:])
+        except OSError:  # half a line would stay, and another one of the next attempt behind it
+            written = data.rfind(_LINE_END, 0, written) + 1
+            with suppress(OSError):
+                os.ftruncate(self._descriptor, begin + written)
+            raise
+        finally:
+            self._bytes = begin + written
 
     def _is_as_left(self, descriptor: int) -> bool:
         """Whether what was written is still at *path*: nobody has removed, replaced, moved or emptied the file."""
