@@ -223,8 +223,9 @@ async def record_trace(path: str | Path, *, max_bytes: int = DEFAULT_MAX_BYTES) 
         max_bytes: Of both files together, at least 65,536.
 
     Raises:
-        InvalidCommandError: *path* is there, and no trace, or can be no name; or *max_bytes* is too little.
-        OSError: The file cannot be opened, is no plain file, or somebody else records to it.
+        InvalidCommandError: *path*, or ``<path>.1``, is there, and no trace, or can be no name; or *max_bytes* is too
+            little.
+        OSError: The file cannot be opened, or not within ten seconds, is no plain file, or somebody else records to it.
     """
     if isinstance(max_bytes, bool) or not isinstance(max_bytes, int) or max_bytes < SMALLEST_TRACE:
         raise InvalidCommandError(f"max_bytes is a whole number from {SMALLEST_TRACE} on, not {max_bytes!r}")
