@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from math import pi
 
 import pytest
+from tests.camm1.little_plotter import segments
+from tests.fakes.vpype_jobs import needs_vpype, vpype_job
 
 from compax_aio import camm1
 from compax_aio.camm1.previewing.drawing import Bounds, Drawing, Place
@@ -86,6 +89,8 @@ def test_user_units_become_steps_where_their_size_is_said() -> None:
     assert cuts("IP100,100,300,500;SC0,10,0,10;PR;PD1,1;PU;") == [[(0, 0), (20, 40)]]
     assert cuts("IP100,100,300,500;SC0,10,0,10;SC;PD10,5;PU;") == [[(0, 0), (10, 5)]]
     assert cuts("IP0,0,100,100;IP10,10;SC0,1,0,1;PA;PD1,1;PU;") == [[(0, 0), (110, 110)]]
+    assert cuts("IP0,0,100,100;IP;SC0,1,0,1;PA;PD1,1;PU;") == [[(0, 0), (1, 1)]]
+    assert cuts("PD\x1b.B10,0;\x1b.OPU;OA;") == [[(0, 0), (10, 0)]]
 
 
 def test_user_units_of_a_size_that_nobody_said_are_remarked() -> None:
@@ -98,7 +103,7 @@ def test_user_units_of_a_size_that_nobody_said_are_remarked() -> None:
 
 def test_a_circle_is_cut_around_where_the_tool_stands_and_leaves_it_there_as_it_was() -> None:
     drawing = drawn("PU1000,1000;CI400;")
-    assert drawing.end == (1000, 1000)
+    assert drawing.end == pytest.approx((1000, 1000))
     assert drawing.cut_bounds is not None
     assert drawing.cut_bounds.left == pytest.approx(600)
     assert drawing.cut_bounds.top == pytest.approx(1400)
@@ -114,7 +119,7 @@ def test_the_chord_of_a_circle_is_its_second_number() -> None:
 @pytest.mark.parametrize("job", ["PU400,0;PD;AA0,0,90;PU;", "PU400,0;PD;AR-400,0,90;PU;"])
 def test_an_arc_is_drawn_as_the_tool_stands(job: str) -> None:
     (arc,) = cuts(job)
-    assert arc[0] == (400, 0)
+    assert arc[0] == pytest.approx((400, 0))
     assert arc[-1] == pytest.approx((0, 400))
     assert cuts(job.replace("PD;", "")) == []
 
@@ -127,8 +132,9 @@ def test_a_rectangle_is_cut_around_and_leaves_the_tool_where_it_was(job: str) ->
 
 def test_a_wedge_goes_out_around_and_back() -> None:
     (edge,) = cuts("EW100,0,90,45;")
-    assert edge[0] == edge[-1] == (0, 0)
-    assert edge[1] == (100, 0)
+    assert edge[0] == pytest.approx((0, 0))
+    assert edge[-1] == pytest.approx((0, 0))
+    assert edge[1] == pytest.approx((100, 0))
     assert edge[-2] == pytest.approx((0, 100))
 
 
@@ -174,7 +180,7 @@ def test_a_label_takes_the_room_of_its_characters_and_leaves_the_tool_behind_it(
     (box,) = drawing.boxes
     assert box.text == "ABC"
     assert Bounds.of(box.corners) == Bounds(100, 100, 100 + 200 * 4, 100 + 400)
-    assert drawing.end == (100 + 200 * 4.5, 100)
+    assert drawing.end == pytest.approx((100 + 200 * 4.5, 100))
     assert "boxes of about their size" in remarks("LBABC\x03")
 
 
@@ -261,3 +267,18 @@ def test_where_the_tool_stands_at_a_byte_of_the_job_is_known() -> None:
     assert marks.at(3) == marks.at(10) == (10, 10)
     assert marks.at(11) == marks.at(500) == (20, 20)
     assert drawn("").waymarks.at(0) is None
+
+
+# Real jobs ----------------------------------------------------------------------------------------------------------
+
+
+@needs_vpype
+@pytest.mark.parametrize("is_absolute", [False, True])
+def test_the_cuts_of_a_real_job_are_those_that_another_plotter_draws(is_absolute: bool) -> None:
+    job = camm1.parse(vpype_job(30_000, is_absolute=is_absolute), camm1.HP_7475A)
+    plain = b"".join(each.data for each in job if each.name not in {"DF", "PS", "SP"})
+    expected = [((x0, y0), (x1, y1)) for x0, y0, x1, y1, is_down in segments(plain) if is_down]
+    strokes = drawing_of(job.instructions).strokes
+    assert [pair for stroke in strokes if stroke.is_cut for pair in pairwise(stroke.points)] == expected
+    for before, after in pairwise(strokes):
+        assert after.points[0] == before.points[-1]

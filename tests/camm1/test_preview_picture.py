@@ -259,9 +259,25 @@ def test_a_form_that_nobody_writes_is_refused(tmp_path: Path) -> None:
         camm1.preview(camm1.parse(SQUARE, camm1.PNC_900), tmp_path.joinpath("job.bmp").relative_to(tmp_path))
 
 
-def test_a_picture_that_cannot_be_written_leaves_what_was_there(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["job.svg", "job.png"])
+def test_a_picture_that_cannot_be_written_leaves_nothing_behind(tmp_path: Path, name: str) -> None:
     with pytest.raises(FileNotFoundError):
-        camm1.preview(camm1.parse(SQUARE, camm1.PNC_900), tmp_path / "nowhere" / "job.svg")
+        camm1.preview(camm1.parse(SQUARE, camm1.PNC_900), tmp_path / "nowhere" / name)
+    (tmp_path / name).mkdir()
+    with pytest.raises(IsADirectoryError):
+        camm1.preview(camm1.parse(SQUARE, camm1.PNC_900), tmp_path / name)
+    assert [each.name for each in tmp_path.iterdir()] == [name]
+
+
+def test_problems_and_the_sheet_are_in_the_picture(tmp_path: Path) -> None:
+    path, sheet = tmp_path / "job.svg", camm1.Sheet(15, 50)
+    job = camm1.parse(SQUARE + "QQ5;", camm1.PNC_900)
+    problems = camm1.check(job, camm1.PNC_900, sheet)
+    camm1.preview(job, path, profile=camm1.PNC_900, sheet=sheet, problems=problems)
+    root = ET.fromstring(path.read_text())
+    texts = [each.text or "" for each in root.iter(f"{SVG}text")]
+    assert any(each.endswith("'QQ5;' is no instruction") for each in texts)
+    assert {"sheet", "problem"} <= set(texts)
 
 
 def test_steps_are_those_of_the_machine(tmp_path: Path) -> None:

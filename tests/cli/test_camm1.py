@@ -309,12 +309,11 @@ def test_a_pause_at_the_panel_is_told_and_waited_for(compax: Compax, on_stage: P
     assert "long.plt: cutting long.plt: paused at the panel long.plt: cutting" in text
 
 
-def test_a_job_that_is_ended_at_the_panel_is_told_as_stopped(compax: Compax, on_stage: Plan) -> None:
+def test_a_job_that_is_ended_at_the_panel_is_told_as_such(compax: Compax, on_stage: Plan) -> None:
     on_stage(5.0, lambda cutter: cutter.press_pause())
     on_stage(20.0, lambda cutter: cutter.press_setup())
     code, text = compax("cut", CUTTER, "long.plt", "square.plt", "--yes")
-    assert code == 7
-    assert "MoveStoppedError" in text
+    assert code in {7, 8}  # whether its data was deleted may be seen, or not
     assert "as PAUSE and SETUP at the machine do" in text
     assert "not begun: square.plt" in text
 

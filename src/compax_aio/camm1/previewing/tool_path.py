@@ -376,6 +376,6 @@ _NOT_DRAWN: Final[Mapping[str, str]] = {
 _OF_TEXT: Final = frozenset({"LB", "P"})
 
 _OF_NO_SHAPE: Final = frozenset(
-    {"PT", "FT", "TL", "DT", "CA", "CS", "SA", "SS", "IM", "!NR", "!FS", "FS", "B", "AS", "AP"}
+    {"PT", "FT", "TL", "DT", "CA", "CS", "SA", "SS", "IM", "!NR", "!FS", "FS", "B", "AS", "AP", "PS", "CO", "WD", "NR"}
 )
 """They change nothing that is drawn here."""

@@ -80,7 +80,7 @@ async def read_job_patiently(path: Path, profile: camm1.Profile) -> NamedJob:
         job, error = None, None
         try:
             job = read_job(path, profile)
-        except (InvalidCommandError, OSError, ValueError) as problem:
+        except Exception as problem:  # whatever it is, who waits for the job is told
             error = problem
         with suppress(RuntimeError):  # of a loop that is closed
             loop.call_soon_threadsafe(tell, job, error)

@@ -34,7 +34,11 @@ def _sheet(_kind: Any, tokens: Sequence[Token]) -> camm1.Sheet:
 SheetSize = Annotated[
     camm1.Sheet | None,
     Parameter(
-        name="--sheet", converter=_sheet, n_tokens=1, help="What lies in the machine: mm along x and y, as in 400x280."
+        name="--sheet",
+        converter=_sheet,
+        n_tokens=1,
+        accepts_keys=False,
+        help="What lies in the machine: mm along x and y, as in 400x280.",
     ),
 ]
 
