@@ -301,5 +301,6 @@ class SimulatedCutter:
     def _act(self, now: float | None, action: Callable[[], None]) -> None:
         self.advance(now)
         action()
+        self.advance(self._around.now)
         if self.served_by is not None:
             self.served_by.changed()

@@ -71,6 +71,8 @@ class Machine:
         self._reader = Reader(knobs.language)
         own = (facts.force_instruction.value, facts.tool_instruction.value)
         names = (facts.mnemonics.value or frozenset()).union(each for each in own if each)
+        if knobs.language == "mode2":
+            names = frozenset(each for each in names if len(each) > 1)
         self._interpreter = Interpreter(self.tool, self._reader, names)
         self.is_ready = knobs.ready
         self.is_paused = self.is_blinking = self.blade.has_drawn = False
