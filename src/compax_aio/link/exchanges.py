@@ -46,6 +46,8 @@ class Exchange:
     """Whether it was sent in its turn, on this line or an earlier one."""
     received: str | None = None
     """What had come until then."""
+    patience_s: float | None = None
+    """For how long it was, if it was given up."""
     number: int | None = None
     """By which taps know it."""
     _crowded_at: int = _CROWD

@@ -101,6 +101,7 @@ class Turns:
         self._is_ended = False
         self._deadline = Deadline(self._time_is_up)
         self._began_at = 0.0
+        self._patience_s = answer_timeout_s
         self._grace = Deadline(self.pump)
         """So long is waited on for a late answer where nothing may be sent to get in step."""
 
@@ -228,7 +229,8 @@ class Turns:
 
     def _give_time(self) -> None:
         patience_s = self._protocol.patience_s
-        self._deadline.put_off(self._answer_timeout_s if patience_s is None else patience_s)
+        self._patience_s = self._answer_timeout_s if patience_s is None else patience_s
+        self._deadline.put_off(self._patience_s)
 
     def _take_events(self) -> None:
         # Nothing new is sent until every event is dealt with: a turn that began in between would get their answers.
@@ -386,8 +388,8 @@ class Turns:
         """Give up waiting for the answer to *exchange*: from now on it is late."""
         self._stats.timeouts += 1
         self._outstanding = None
-        self._log.tell(logging.WARNING, "no answer to %r within %g s", exchange.text, self._answer_timeout_s)
-        exchange.is_late = True
+        self._log.tell(logging.WARNING, "no answer to %r within %.3g s", exchange.text, self._patience_s)
+        exchange.is_late, exchange.patience_s = True, self._patience_s
         self._doubtful = exchange
         exchange.received = self._history.received_since_sent()
         if not exchange.settles_late:
