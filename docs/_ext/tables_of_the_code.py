@@ -28,6 +28,7 @@ from compax_aio.compax.facts.settings import DIALECT_FACTS, SETTING_FACTS
 from compax_aio.compax.facts.status import S16_BITS, S17_BITS, STATUS_VALUES
 from compax_aio.compax.protocol import TRANSITIONS, State
 from compax_aio.compax.settings import Dialect, DriveSettings
+from compax_aio.simulator.camm1 import Knobs as CutterKnobs
 from compax_aio.simulator.compax import Knobs
 from compax_aio.simulator.smc import Knobs as SmcKnobs
 from compax_aio.smc.facts import COMMANDS, Reply
@@ -401,6 +402,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
         ("table-of-smc-transitions", _smc_transitions),
         ("table-of-smc-settings", _smc_settings),
         ("table-of-smc-knobs", partial(_knobs, SmcKnobs)),
+        ("table-of-camm1-knobs", partial(_knobs, CutterKnobs)),
         ("table-of-profiles", _profiles),
     )
     for name, make in tables:

@@ -59,6 +59,18 @@ class Host:
         self.until_idle()
         return self.cutter.cuttings.cut
 
+    def is_dtr_high(self) -> bool:
+        """Whether DTR says that there is room."""
+        return self.cutter.is_dtr_high
+
+    def is_idle(self) -> bool:
+        """Whether nothing is left to do."""
+        return self.cutter.is_idle
+
+    def is_blinking(self) -> bool:
+        """Whether the light says that there was an error in the data."""
+        return self.cutter.is_blinking
+
     def texts(self, *kinds: LogKind) -> list[str]:
         """List what the log says of some kinds."""
         self.cutter.advance(self.now)

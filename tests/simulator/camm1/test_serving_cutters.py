@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import time
+from collections.abc import Callable
 from typing import cast
 
 import pytest
@@ -21,7 +22,7 @@ from compax_aio.transports.registry import open_transport
 class _Near(asyncio.Protocol):
     def __init__(self) -> None:
         self.heard = bytearray()
-        self.is_paused = False
+        self.pauses: list[str] = []
         self.transport: asyncio.Transport | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -31,18 +32,22 @@ class _Near(asyncio.Protocol):
         self.heard += data
 
     def pause_writing(self) -> None:
-        self.is_paused = True
+        self.pauses.append("paused")
 
     def resume_writing(self) -> None:
-        self.is_paused = False
+        self.pauses.append("resumed")
 
     async def until_heard(self, end: bytes) -> bytes:
         async with asyncio.timeout(100):
-            while not self.heard.endswith(end):
-                await asyncio.sleep(0.01)
+            await _until(lambda: self.heard.endswith(end))
         heard = bytes(self.heard)
         self.heard.clear()
         return heard
+
+
+async def _until(is_so: Callable[[], bool], look_every_s: float = 0.01) -> None:
+    while not is_so():  # noqa: ASYNC110  # a log has no event to wait for
+        await asyncio.sleep(look_every_s)
 
 
 async def _opened(url: str) -> tuple[asyncio.Transport, _Near]:
@@ -73,8 +78,7 @@ async def test_answers_take_the_time_of_their_bytes() -> None:
     transport, near = await _opened("sim://camm1?baudrate=1200")
     began = asyncio.get_running_loop().time()
     transport.write(b"\x1b.B")
-    while not near.heard:
-        await asyncio.sleep(0.0001)
+    await _until(lambda: bool(near.heard), 0.0001)
     assert near.heard == b"1024\r"
     assert asyncio.get_running_loop().time() - began == pytest.approx(8 * 10 / 1200, abs=0.001)
     transport.abort()
@@ -100,13 +104,13 @@ async def test_a_wired_dtr_holds_back_what_the_host_writes() -> None:
     for _ in range(40):
         transport.write(b"PU1,1;" * 10)
         await asyncio.sleep(0.1)
-    assert near.is_paused
+    assert near.pauses == ["paused"]
     assert not cutter.is_dtr_high
     assert cutter.lost_bytes == 0
     assert transport.get_write_buffer_size() > 1000
     cutter.press_pause()
     await asyncio.sleep(100)
-    assert not near.is_paused
+    assert near.pauses == ["paused", "resumed"]
     assert transport.get_write_buffer_size() == 0
     assert cutter.cuttings.vectors.total == 400
     transport.abort()
@@ -145,7 +149,7 @@ async def test_who_wants_to_know_is_told_in_time() -> None:
     transport, _ = await _opened("sim://camm1?name=w")
     transport.write(b"PU400,0;PD0,0;PU;")
     await asyncio.sleep(10)
-    told = dict((text, at) for at, text in seen)
+    told = {text: at for at, text in seen}
     assert told["PU"] == pytest.approx(0.03, abs=0.001)
     transport.abort()
 
@@ -218,8 +222,7 @@ async def test_a_wired_dtr_leaves_bytes_in_the_pty() -> None:
             assert written > 1024
             cutter.press_pause()
             async with asyncio.timeout(30):
-                while len(cutter.log.texts(LogKind.INSTRUCTION)) < written // 3:
-                    await asyncio.sleep(0.01)
+                await _until(lambda: len(cutter.log.texts(LogKind.INSTRUCTION)) >= written // 3)
             assert cutter.lost_bytes == 0
         finally:
             os.close(port)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -345,6 +346,6 @@ def test_pieces_and_looks_of_any_size_change_nothing(data: st.DataObject) -> Non
 
     cuts = sorted(data.draw(st.lists(st.integers(0, len(job)), max_size=8)))
     edges = [0, *cuts, len(job)]
-    pieces = [job[begin:end] for begin, end in zip(edges[:-1], edges[1:], strict=True)]
+    pieces = [job[begin:end] for begin, end in pairwise(edges)]
     looks = data.draw(st.lists(st.floats(0, 0.05), max_size=20))
     assert outcome(pieces, looks) == outcome([job], [])

@@ -203,14 +203,14 @@ def test_xoff_does_not_wait_for_the_trigger_of_a_reply() -> None:
 def test_dtr_falls_when_less_than_a_block_is_free(size: int, low: int) -> None:
     host = Host.frozen(physical_size=size)
     host.send(b";" * (size - low))
-    assert host.cutter.is_dtr_high
+    assert host.is_dtr_high()
     host.send(b";")
-    assert not host.cutter.is_dtr_high
+    assert not host.is_dtr_high()
     assert host.send(b";") == b""
     assert host.cutter.stored_bytes == size - low + 2
     host.cutter.press_pause(host.now)
     host.until_idle()
-    assert host.cutter.is_dtr_high
+    assert host.is_dtr_high()
     assert host.texts(LogKind.HANDSHAKE) == ["DTR low", "DTR high"]
 
 
@@ -218,15 +218,15 @@ def test_the_block_of_i_is_the_level_of_dtr() -> None:
     host = Host.frozen()
     host.control("I200:")
     host.send(b";" * 825)
-    assert not host.cutter.is_dtr_high
+    assert not host.is_dtr_high()
 
 
 def test_the_levels_of_dtr_can_be_set() -> None:
     host = Host.frozen(dtr_low_below=100, dtr_high_at=500, instruction_time_s=0.001)
     host.send(b"PU;" * 309)
-    assert not host.cutter.is_dtr_high
+    assert not host.is_dtr_high()
     host.cutter.press_pause(host.now)
-    while not host.cutter.is_dtr_high:
+    while not host.is_dtr_high():
         host.wait(0.001)
     assert 500 <= host.cutter.free_bytes < 506
 
@@ -254,13 +254,13 @@ def test_a_wired_dtr_stops_bytes_that_take_no_time() -> None:
 def test_dtr_can_be_turned_off() -> None:
     host = Host.frozen(model="PNC-900", physical_size=1024)
     host.send(b";" * 1000)
-    assert not host.cutter.is_dtr_high
+    assert not host.is_dtr_high()
     host.control("@;0:")
-    assert host.cutter.is_dtr_high
+    assert host.is_dtr_high()
     host.control("@:")
-    assert not host.cutter.is_dtr_high
+    assert not host.is_dtr_high()
     host.control("@;2:")
-    assert host.cutter.is_dtr_high
+    assert host.is_dtr_high()
 
 
 # Presets and power-on
@@ -286,16 +286,17 @@ def test_preset_1_is_xon_xoff() -> None:
     host = Host.frozen()
     host.control("P1:")
     assert host.send(b";" * 1000, 0.1) == b"\x13"
-    assert host.cutter.is_dtr_high
+    assert host.is_dtr_high()
 
 
 @pytest.mark.parametrize(
-    ("knob", "dtr", "out"), [("model", False, b""), ("hardwire", False, b""), ("dummy", True, b""), ("xonxoff", True, b"\x13")]
-)  # fmt: skip
+    ("knob", "dtr", "out"),
+    [("model", False, b""), ("hardwire", False, b""), ("dummy", True, b""), ("xonxoff", True, b"\x13")],
+)
 def test_what_rules_after_power_on(knob: str, dtr: bool, out: bytes) -> None:
     host = Host.frozen(power_on_handshake=knob)
     assert host.send(b";" * 1000) == out
-    assert host.cutter.is_dtr_high == dtr
+    assert host.is_dtr_high() == dtr
 
 
 @pytest.mark.parametrize(("knob", "out"), [(False, b""), (True, b"\x13")])

@@ -207,11 +207,11 @@ def test_speed_and_overhead_are_what_a_vector_takes() -> None:
     assert host.cutter.position()[2] is False
     host.wait(0.02)
     assert host.cutter.position()[2] is True
-    assert not host.cutter.is_idle
+    assert not host.is_idle()
     host.wait(2.48)
-    assert not host.cutter.is_idle
+    assert not host.is_idle()
     host.wait(0.02)
-    assert host.cutter.is_idle
+    assert host.is_idle()
 
 
 def test_a_pen_is_put_back_with_the_carriage_up() -> None:
@@ -310,7 +310,7 @@ def test_what_is_wrong_with_a_job_is_told(job: str, error: int) -> None:
     host.send(job.encode("latin-1") + b" ;PU;")
     host.until_idle()
     assert host.cutter.data_error == error
-    assert host.cutter.is_blinking
+    assert host.is_blinking()
     assert host.send(b"OE;OE;", 1.0) == f"{error}\r0\r".encode()
     assert host.texts(LogKind.DATA_ERROR)[0].startswith(f"{error} ")
 
@@ -325,9 +325,9 @@ def test_after_an_error_it_goes_on_or_stands_until_power_on(knobs: dict[str, Any
     host = Host(time_factor=0, **knobs)
     host.send(b"ZZ;PD10,10;", 1.0)
     assert len(host.cutter.cuttings.cut) == cuts
-    assert host.cutter.is_blinking
+    assert host.is_blinking()
     host.cutter.power_cycle(host.now)
-    assert not host.cutter.is_blinking
+    assert not host.is_blinking()
     host.send(b"PD20,20;", 1.0)
     assert len(host.cutter.cuttings.cut) == cuts + 1
 

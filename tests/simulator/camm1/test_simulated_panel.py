@@ -26,9 +26,9 @@ def test_a_pause_holds_the_tool_where_it_is() -> None:
     assert host.ask("O") & 16
     host.cutter.press_pause(host.now)
     host.wait(0.49)
-    assert not host.cutter.is_idle
+    assert not host.is_idle()
     host.wait(0.02)
-    assert host.cutter.is_idle
+    assert host.is_idle()
     assert host.texts(LogKind.PANEL) == ["pause", "resume"]
 
 
@@ -193,9 +193,9 @@ def test_a_slow_machine_and_its_end() -> None:
     host.cutter.heal()
     host.cutter.slow_down(10.0, host.now)
     host.send(b"PD4000,0;", 9.9)
-    assert not host.cutter.is_idle
+    assert not host.is_idle()
     host.wait(0.2)
-    assert host.cutter.is_idle
+    assert host.is_idle()
 
 
 def test_output_that_nobody_takes_is_bounded() -> None:

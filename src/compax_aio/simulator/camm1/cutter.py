@@ -75,6 +75,11 @@ class SimulatedCutter:
         return self._inside.handshakes.free
 
     @property
+    def received_bytes(self) -> int:
+        """How many bytes have come from the host since it was made, data and all else."""
+        return self._wire.taken
+
+    @property
     def lost_bytes(self) -> int:
         """How many bytes of data were lost because the buffer was full, since power-on."""
         return self._inside.reception.lost_bytes

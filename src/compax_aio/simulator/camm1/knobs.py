@@ -58,7 +58,7 @@ class Knobs:
 
     # The line
 
-    baudrate: Literal[0, 1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200] = 0
+    baudrate: Literal[0, 300, 600, 1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200] = 0
     """Byte timing of both directions; 0: bytes take no time."""
     byte_bits: Annotated[int, Range(9, 12)] = 10
     """Bits of a byte on the wire, with start, parity and stop bits."""

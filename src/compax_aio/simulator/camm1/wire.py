@@ -41,6 +41,7 @@ class Wire:
 
     Attributes:
         is_stopped: The host is stopped, and what it has written waits with it.
+        taken: How many bytes have arrived.
     """
 
     def __init__(self, byte_time_s: float, overshoot_bytes: int = 0) -> None:
@@ -51,7 +52,7 @@ class Wire:
         self._waiting: deque[_Piece] = deque()
         self._free_at = 0.0
         self._bytes = 0
-        self._taken = 0
+        self.taken = 0
         self._found: dict[bytes, tuple[int, int]] = {}
 
     def __len__(self) -> int:
@@ -147,7 +148,7 @@ class Wire:
         begin = piece.place
         piece.place = end = begin + count
         self._bytes -= count
-        self._taken += count
+        self.taken += count
         if end == piece.end:
             self._pieces.popleft()
         return piece.data[begin:end]
@@ -164,7 +165,7 @@ class Wire:
     def first(self, sign: bytes) -> int | None:
         """Return how many bytes the host has written in front of the first *sign*; None: there is none."""
         found, looked = self._found.get(sign, (-1, 0))
-        taken = self._taken
+        taken = self.taken
         if found >= taken:
             return found - taken
         if looked == taken + self._bytes:
