@@ -113,7 +113,7 @@ async def test_a_step_of_its_own_is_left_for_its_neighbours(jogging: Jogging) ->
     assert jogging.step == 5.0
 
 
-async def test_machine_zero_is_looked_for_when_asked_twice(jogging: Jogging, far_end: SimulatedDrive) -> None:
+async def test_machine_zero_is_looked_for_after_a_yes_alone(jogging: Jogging, far_end: SimulatedDrive) -> None:
     jogging.press("h")
     jogging.press("x")
     assert jogging.message == "machine zero is not looked for"
@@ -123,10 +123,21 @@ async def test_machine_zero_is_looked_for_when_asked_twice(jogging: Jogging, far
     await until(lambda: not jogging.is_moving)
     assert far_end.log.texts(LogKind.MOTION_STARTED) == ["POSR 10.00"]
     jogging.press("h")
-    jogging.press("h")
+    jogging.press("y")
     await until(lambda: not jogging.is_moving)
     assert jogging.message == "machine zero: reached"
     assert far_end.position == 0.0
+
+
+async def test_a_key_that_is_held_does_not_say_yes(jogging: Jogging, far_end: SimulatedDrive) -> None:
+    for _ in range(50):
+        jogging.press("h")
+        await asyncio.sleep(0.03)
+    assert "look for machine zero?" in jogging.message
+    jogging.press("x")
+    jogging.press("y")
+    assert not jogging.is_moving
+    assert far_end.log.texts(LogKind.MOTION_STARTED) == []
 
 
 async def test_arrows_do_not_stop_a_search_in_the_direction_they_know_nothing_of(
@@ -135,7 +146,7 @@ async def test_arrows_do_not_stop_a_search_in_the_direction_they_know_nothing_of
     jogging.press("right")
     await until(lambda: not jogging.is_moving)
     jogging.press("h")
-    jogging.press("h")
+    jogging.press("y")
     await until(lambda: far_end.moving)
     jogging.press("right")
     await until(lambda: not jogging.is_moving)

@@ -9,6 +9,7 @@ from contextlib import asynccontextmanager
 import pytest
 import textual
 from tests.promises.cable import Cable
+from textual import events
 from textual.pilot import Pilot
 from textual.widgets import RichLog
 
@@ -128,6 +129,22 @@ async def test_steps_grow_and_shrink_and_shift_takes_ten() -> None:
         await seat.press("m", "plus", "plus", "minus", "shift+left")
         await until(lambda: moving_lines("x") == ["SD50", "PR-20$"])
         await seat.sees("jog -20 mm: reached -20.00 mm")
+
+
+async def test_keys_that_wait_for_a_busy_computer_move_nothing() -> None:
+    async with seated(simulated("x"), asks=False) as seat:
+        await seat.sees("STANDING")
+        await seat.press("m")
+        late = [events.Key(key, None) for key in ("right", "right", "shift+left", "h", "y")]
+        stop = events.Key("space", " ")
+        await asyncio.sleep(1)
+        for key in (*late, stop):
+            seat.monitor.post_message(key)
+        await seat.sees("right: not heeded, it came too late")
+        await until(lambda: "STOP" in moving_lines("x"))
+        assert moving_lines("x") == ["STOP"]
+        await seat.press("m", "right")
+        await until(lambda: "PR1$" in moving_lines("x"))
 
 
 async def test_machine_zero_is_looked_for_only_after_a_question() -> None:

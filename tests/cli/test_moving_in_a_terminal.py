@@ -165,6 +165,18 @@ async def test_a_terminal_that_is_held_by_ctrl_s_does_not_keep_a_signal_from_sto
     assert drive.position < 2000 / 3
 
 
+async def test_ctrl_z_leaves_no_axis_alone(
+    open_terminal: Callable[..., Terminal], url: str, drive: SimulatedDrive
+) -> None:
+    terminal = open_terminal("move", url, "2000", "--timeout", "5")
+    await until(lambda: drive.moving)
+    terminal.types("\x1a")
+    await terminal.sees("Not put to sleep")
+    await until(lambda: not drive.moving)
+    code, _ = await terminal.ends()
+    assert code == 7
+
+
 async def test_a_yes_that_was_typed_ahead_is_none(
     open_terminal: Callable[..., Terminal], url: str, drive: SimulatedDrive
 ) -> None:
@@ -237,7 +249,7 @@ async def test_jogging_moves_stops_and_gives_the_terminal_back(
     await terminal.sees("stopped; it stands")
     assert not drive.moving
     terminal.types("\x1b")
-    await terminal.sees("x stands at")
+    await terminal.sees("nothing that was started here moves x")
     assert termios.tcgetattr(terminal.child.child_fd)[3] & termios.ICANON
     code, _ = await terminal.ends()
     assert code == 0

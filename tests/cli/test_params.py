@@ -7,13 +7,15 @@ import os
 import pty
 import signal
 import sys
+from collections import deque
 from collections.abc import Callable, Iterator
-from functools import partial
 from pathlib import Path
 
 import pytest
 from tests.fakes.commands import Commands
 
+from compax_aio.cli import confirming
+from compax_aio.cli.keyboard import forget_typed
 from compax_aio.simulator.compax import Knobs, LogKind, SimulatedDrive
 from compax_aio.simulator.compax.parameters import Parameters
 from compax_aio.simulator.compax.refusals import SYNTAX, RefusedError
@@ -46,11 +48,19 @@ def saved(compax: Commands, x: SimulatedDrive, tmp_path: Path) -> Path:
 
 @pytest.fixture
 def answer(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[bytes], object]]:
-    """A terminal as the input, and what types at it."""
+    """A terminal as the input, and somebody who waits for questions, and types at it what is said here."""
     ours, theirs = pty.openpty()
+    answers: deque[bytes] = deque()
+
+    def forget_and_answer() -> None:
+        forget_typed()
+        if answers:
+            os.write(ours, answers.popleft())
+
+    monkeypatch.setattr(confirming, "forget_typed", forget_and_answer)
     with os.fdopen(theirs) as terminal:
         monkeypatch.setattr(sys, "stdin", terminal)
-        yield partial(os.write, ours)
+        yield answers.append
     os.close(ours)
 
 
@@ -341,6 +351,17 @@ def test_a_restore_that_stops_half_way_says_what_the_drive_has(
     assert "what it had before" in rows["P41"]
     assert "not known" in rows["P10"] or "the new one" in rows["P10"]
     assert "the parameters may be unprotected still" in outcome.told
+
+
+def test_ctrl_c_while_it_is_put_in_force_says_that_it_is_written(compax: Commands, x: SimulatedDrive) -> None:
+    x.extra_answer_delay_s = 0.05
+    when_received(x, compax, "VP", lambda: signal.raise_signal(signal.SIGINT))
+    outcome = compax("params", "set", X, "P10=333", "--yes", "--name", "x")
+    assert outcome.code == 130
+    assert (
+        "Interrupted. x: 1 parameter written and read back; whether VP has put it in force is not known."
+        in outcome.told
+    )
 
 
 def test_ctrl_c_half_way_says_what_the_drive_has(compax: Commands, x: SimulatedDrive, saved: Path) -> None:

@@ -84,6 +84,14 @@ def test_a_settings_file_that_cannot_be_used_stops_no_stop(compax: Commands, tmp
     assert not x.moving
 
 
+def test_a_recording_that_cannot_be_written_stops_no_stop(compax: Commands, tmp_path: Path) -> None:
+    x = moving(compax, "x")
+    outcome = compax("stop", X, "--trace", str(tmp_path / "no folder" / "x.trace"))
+    assert outcome.code == 0
+    assert "STOP is sent without being recorded" in outcome.err
+    assert not x.moving
+
+
 def test_the_word_for_stop_is_that_of_the_settings(compax: Commands, tmp_path: Path) -> None:
     x = moving(compax, "x")
     DriveSettings(dialect=Dialect(stop="HALT")).save(tmp_path / "x.toml")

@@ -107,6 +107,8 @@ class Interruption:
                 if before not in {signal.SIG_IGN, None}:
                     self._before[number] = before
                     signal.signal(number, self._take)
+            if not self.moves_nothing and (stop := getattr(signal, "SIGTSTP", None)) is not None:
+                self._before[stop] = signal.signal(stop, self._stay_awake)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -157,6 +159,10 @@ class Interruption:
         # Not from here, which is between any two steps of whatever runs.
         with suppress(RuntimeError):  # the loop has just been closed
             task.get_loop().call_soon_threadsafe(self._cancel if self._count == 1 else self._tell_patience)
+
+    def _stay_awake(self, _number: int, _: FrameType | None) -> None:
+        """Let Ctrl-Z be: an axis would go on, and nobody would watch it, nor heed its time-out."""
+        self._say("Not put to sleep: what may move an axis has to watch it. Ctrl-C stops what it has set in motion.")
 
     def _cancel(self) -> None:
         assert self._task is not None

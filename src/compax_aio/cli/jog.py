@@ -35,8 +35,8 @@ async def jog(
     Move in small steps by the arrow keys, and see the position.
 
     One key, one step: while one is on its way, the same key is ignored, and the opposite one stops the axis. The keys
-    are arrows left and right for a step, up and down for a longer or shorter one, space to stop, h twice for machine
-    zero, q or Escape to stop and leave, as does Ctrl-C.
+    are arrows left and right for a step, up and down for a longer or shorter one, space to stop, h and then y for
+    machine zero, q or Escape to stop and leave, as does Ctrl-C.
 
     The speed stays in force in the drive for moves that say none.
 
@@ -62,10 +62,12 @@ async def _by_keys(drive: Drive, step: float, speed: float) -> int:
                     await jogging.left.wait()
                 finally:
                     was_moving = await jogging.end()
-                    said = f"{drive.name} has acknowledged STOP and stands" if was_moving else f"{drive.name} stands"
-                    say_at_end(f"Interrupted. {said}.")
-    position = await drive.position()
-    notes_console().print(f"{said} at {written(drive, position)}.", markup=False)
+                    stands = f"{drive.name} has acknowledged STOP and stands"
+                    rests = f"nothing that was started here moves {drive.name}"
+                    say_at_end(f"Interrupted: {stands if was_moving else rests}.")
+    where = written(drive, await drive.position())
+    said = f"{stands} at {where}" if was_moving else f"{drive.name} is at {where}; {rests}"
+    notes_console().print(f"{said}.", markup=False)
     return INTERRUPTED if jogging.is_interrupted else OK
 
 

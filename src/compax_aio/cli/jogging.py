@@ -13,7 +13,7 @@ __all__ = ["KEYS", "STEPS", "Jogging"]
 STEPS: Final = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 """In units of the axis; the arrows up and down go from one to the next."""
 
-KEYS: Final = "← → one step · ↑ ↓ another step · space stop · h machine zero · q stop and leave"
+KEYS: Final = "← → one step · ↑ ↓ another step · space stop · h y machine zero · q stop and leave"
 
 
 class Jogging:
@@ -61,7 +61,7 @@ class Jogging:
         Do what *key* says.
 
         Args:
-            key: ``left``, ``right``, ``up``, ``down``, ``space``, ``s``, ``h``, ``q``, ``interrupt``.
+            key: ``left``, ``right``, ``up``, ``down``, ``space``, ``s``, ``h``, ``y``, ``q``, ``interrupt``.
         """
         was_asked, self._asks_for_home = self._asks_for_home, False
         if key in {"left", "right"}:
@@ -71,7 +71,9 @@ class Jogging:
         elif key in {"space", "s"}:
             self._begin(self._stop())
         elif key == "h":
-            self._home(was_asked=was_asked)
+            self._ask_for_home()
+        elif key == "y" and was_asked:  # and not h again, which a key that is held says by itself
+            self._home()
         elif key in {"q", "interrupt"}:
             self.is_interrupted |= key == "interrupt"
             self.left.set()
@@ -86,13 +88,12 @@ class Jogging:
         elif self._move is not None and direction != self._direction:
             self._begin(self._stop())
 
-    def _home(self, *, was_asked: bool) -> None:
-        if self.is_moving:
-            return
-        if not was_asked:
+    def _ask_for_home(self) -> None:
+        if not self.is_moving:
             self._asks_for_home = True
-            self._say("h once more looks for machine zero: the axis moves as far as it must. Any other key: no")
-            return
+            self._say("look for machine zero? y: the axis moves as far as it must. Any other key: no")
+
+    def _home(self) -> None:
         self._direction = 0
         self._go(self._drive.home, "machine zero")
 

@@ -9,7 +9,7 @@ from typing import Any, Final, get_args, get_origin
 
 from cyclopts import Parameter, Token
 
-__all__ = ["NUMBER", "WHOLE"]
+__all__ = ["NUMBER", "WHOLE", "number_of"]
 
 _WHOLE: Final = re.compile(r"[+-]?[0-9]{1,18}")
 _NUMBER: Final = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
@@ -30,8 +30,16 @@ def _whole_number(text: str) -> int:
 
 
 def _number(_kind: Any, tokens: Sequence[Token]) -> float:
-    """Read a number that is one: nan and inf are none."""
-    text = tokens[0].value
+    return number_of(tokens[0].value)
+
+
+def number_of(text: str) -> float:
+    """
+    Read a number that is one: nan and inf are none.
+
+    Raises:
+        ValueError: It is none.
+    """
     if _NUMBER.fullmatch(text) is None or not isfinite(number := float(text)):
         raise ValueError(f"{text!r} is no number; write 12.5, with a point")
     return number

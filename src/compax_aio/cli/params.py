@@ -14,7 +14,7 @@ from compax_aio import Drive
 from .confirming import confirm, expect_somebody
 from .files import Force, expect_free
 from .half_way import HalfWay, RollBackFlag, Yes
-from .interruption import moves_nothing
+from .interruption import moves_nothing, say_at_end
 from .opening import DriveLine, Url
 from .printing import Printing, notes_console
 from .progress import counting
@@ -240,6 +240,8 @@ async def _write(
         async with HalfWay(drive.name, there, kind.table.name, printing, roll_back=roll_back, may_ask=not yes):
             with counting("writing", printing) as on_progress:
                 done = await there.write_several(changes, on_progress=on_progress)
+        written = f"{kind.counted(len(done.changed))} written and read back"
+        say_at_end(f"Interrupted. {drive.name}: {written}{_in_force(done.pending, vp=vp)}.")
         if done.pending and vp:
             await drive.parameters.make_valid()
     pending = () if vp else done.pending
@@ -251,8 +253,15 @@ async def _write(
             "unchanged": would.unchanged,
             "pending": [kind.table.name(number) for number in pending],
         },
-        f"{drive.name}: {kind.counted(len(done.changed))} written and read back{waiting}",
+        f"{drive.name}: {written}{waiting}",
     )
+
+
+def _in_force(pending: tuple[int, ...], *, vp: bool) -> str:
+    """Say of what was just written, before VP, whether it counts."""
+    if not pending:
+        return ""
+    return "; whether VP has put it in force is not known" if vp else "; not in force before VP"
 
 
 async def _is_wanted(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from contextlib import AsyncExitStack
 from typing import Any, Final
 
 from compax_aio import CompaxError, DriveSettings, InvalidCommandError
@@ -40,15 +41,19 @@ async def stop(
     if line.name is not None and len(urls) > 1:
         raise InvalidCommandError("--name is for one line, and there are several")
     settings = _settings(line, printing)
-    async with line.recorded():
+    async with AsyncExitStack() as stack:
+        try:
+            await stack.enter_async_context(line.recorded())
+        except CompaxError as error:
+            printing.note(f"STOP is sent without being recorded: {error}")
         tasks = {each: asyncio.create_task(_stop_one(each, line.name, settings, printing)) for each in urls}
         try:
             await asyncio.wait(tasks.values())
         except asyncio.CancelledError:
             await _end_all(tasks, settings.standstill_timeout_s)
             raise
-    outcomes = {each: task.result() for each, task in tasks.items()}
-    _show(outcomes, printing)
+        outcomes = {each: task.result() for each, task in tasks.items()}
+        _show(outcomes, printing)
     return _worst([exit_code_of(each) for each in outcomes.values() if isinstance(each, Exception)])
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from math import isfinite
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,6 +17,7 @@ from compax_aio.compax.value_file import read_file
 from compax_aio.compax.value_tables import PARAMETER_TABLE, VARIABLE_TABLE, ValueTable
 
 from .files import reading
+from .number_words import number_of
 
 __all__ = [
     "PARAMETERS",
@@ -171,12 +171,9 @@ def assignments_in(words: Iterable[str], default: Kind, settings: DriveSettings)
 
 def _number(word: str, text: str) -> float:
     try:
-        value = float(text)
+        return number_of(text.strip())
     except ValueError:
-        value = float("nan")
-    if not isfinite(value) or "_" in text:
-        raise InvalidCommandError(f"{word!r}: {text!r} is no number", hint="write 1.5, with a point")
-    return value
+        raise InvalidCommandError(f"{word!r}: {text!r} is no number", hint="write 1.5, with a point") from None
 
 
 def values_in_file(path: Path, kind: Kind, settings: DriveSettings) -> dict[int, float]:

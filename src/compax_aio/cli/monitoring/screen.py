@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from rich.text import Text
-from textual import events
+from textual import _time, events  # whose clock dates them
 from textual.app import App, ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import VerticalScroll
@@ -34,6 +34,10 @@ _ROWS_OF_PANEL = 8
 _ROWS_BESIDE_PANELS = 12
 _STOP_SHOWN_S = 30.0
 """How long it is shown that all axes stand after a stop; that one may not stand is shown until the next stop."""
+
+_MOVING_KEYS = frozenset({"left", "right", "shift+left", "shift+right", "h", "y"})
+_LATE_S = 0.5
+"""A key that repeats itself faster than a busy computer takes it would go on for longer, after it is let go."""
 
 _LOOKING = "looking only: m lets this keyboard move axes"
 
@@ -270,6 +274,13 @@ class Monitor(App[bool]):
         self.is_motion_on = on
         self.cell.diary.add("", f"motion from this keyboard is {'on' if on else 'off'}", Level.ACTIVE)
         self.show()
+
+    async def on_event(self, event: events.Event) -> None:
+        """Take what comes, but no key that moves and was pressed long ago: its finger may have been lifted since."""
+        if isinstance(event, events.Key) and event.key in _MOVING_KEYS and _time.get_time() - event.time > _LATE_S:
+            self.cell.diary.add(self._axis.name, f"{event.key}: not heeded, it came too late", Level.ATTENTION)
+            return
+        await super().on_event(event)
 
     def _may_move(self, what: str) -> bool:
         if not self.is_motion_on:

@@ -23,6 +23,7 @@ from ...errors import (
     UnexpectedAnswerError,
 )
 from ...escaping import escaped, shown
+from ..number_words import number_of
 from .decoding import answered, bits_note, error_note
 from .entries import Kind
 from .explaining import explained, overview
@@ -312,7 +313,7 @@ class Language:
 
 def _number(text: str, what: str) -> float:
     try:
-        return float(text)
+        return number_of(text)
     except ValueError:
         hint = "write a point before the decimals" if "," in text else None
         raise InvalidCommandError(f"{shown(text)} is not {what}", hint=hint) from None
