@@ -13,7 +13,7 @@ from tests.fakes.transports import DeafTransport
 from tests.link.lines import Line, connected, elapsed, unique_name
 
 from compax_aio.compax.protocol import Acknowledged, Answered, PositionReached, Rejected, Stray, UnexpectedAnswer
-from compax_aio.errors import AnswerTimeoutError, CompaxError, ConnectionLostError
+from compax_aio.errors import AnswerTimeoutError, CompaxError, ConnectionLostError, UnexpectedAnswerError
 from compax_aio.link.contract import Lane, TurnOver
 from compax_aio.transports.loopback import listen
 
@@ -440,3 +440,45 @@ async def test_a_stop_in_doubt_is_written_before_every_marker() -> None:
     after = line.far.lines[1:]
     assert after[0::2] == ["STOP"] * RESYNC_ATTEMPTS
     assert all(marker.startswith("S") and marker != "STOP" for marker in after[1::2])
+
+
+# A line that never stays in step --------------------------------------------------------------------------------------
+
+
+def twice(text: str) -> bytes | None:
+    """Answer as two drives on one line would, or an adapter that doubles what it receives."""
+    answer = as_drive(text)
+    return answer and answer * 2
+
+
+async def test_who_asks_on_a_line_where_everything_comes_twice_is_told_in_bounded_time() -> None:
+    line = await connected(ScriptedFarEnd())
+    line.far.script = twice
+    before = len(line.far.lines)
+    error, took_s = await elapsed(line.ask("S1"))
+    later, _ = await elapsed(line.ask("S1"))
+    assert not isinstance(error, CompaxError)  # the first of the two is the answer, and nothing was in doubt before
+    assert isinstance(later, UnexpectedAnswerError)
+    assert later.hint
+    assert "two devices" in later.hint
+    assert took_s < LONGEST_S
+    assert len(line.far.lines) - before < 30
+
+
+async def test_a_line_where_everything_comes_twice_is_not_asked_for_ever_while_nobody_waits() -> None:
+    line = await connected(ScriptedFarEnd())
+    line.far.script = twice
+    await elapsed(line.ask("S1"))
+    before = len(line.far.lines)
+    await asyncio.sleep(100)
+    assert len(line.far.lines) - before < 30
+
+
+async def test_a_line_that_stays_in_step_again_is_used_again() -> None:
+    line = await connected(ScriptedFarEnd())
+    line.far.script = twice
+    await elapsed(line.ask("S1"))
+    await elapsed(line.ask("S1"))
+    line.far.script = as_drive
+    answer, _ = await elapsed(line.ask("S1"))
+    assert isinstance(answer, Answered)

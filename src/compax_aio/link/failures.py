@@ -101,6 +101,18 @@ class Failures:
             exchanges=self._history.lines(),
         )
 
+    def babble(self, times: int, exchange: Exchange | None) -> UnexpectedAnswerError:
+        """Say that the line never stays in step: with each answer comes something that answers nothing."""
+        return UnexpectedAnswerError(
+            f"the line was brought in step {times} times, and each time something else came with the answer",
+            device=self._name,
+            sent=exchange.text if exchange else self._history.last_sent(),
+            received=self._history.received_since_sent(),
+            hint="are two devices on this line, or does somebody else use it? An adapter or server may double what it "
+            "receives",
+            exchanges=self._history.lines(),
+        )
+
     def refused(self, error: CompaxError, exchange: Exchange | None) -> CompaxError:
         """Say why a line that came back is not used; each who waits gets an error of its own."""
         mine = copy(error)

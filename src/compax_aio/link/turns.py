@@ -11,6 +11,7 @@ import asyncio
 import logging
 from collections.abc import Callable
 from functools import partial
+from typing import Final
 
 from ..errors import CompaxError
 from .contract import (
@@ -36,6 +37,9 @@ from .telling import Telling
 from .wire import WireHistory
 
 __all__ = ["Turns"]
+
+_MOST_IN_VAIN: Final = 8
+"""Times a line comes in step and is in doubt again at once, before it counts as one that babbles."""
 
 
 class Turns:
@@ -95,6 +99,8 @@ class Turns:
         self._doubtful: Exchange | None = None
         self._in_step: asyncio.Future[None] | None = None
         self._markers_left = self._more_markers = 0
+        self._times_in_vain = 0
+        """Came in step, and was in doubt again before any exchange was answered."""
         self._is_pursuing = False
         self._may_send_ahead = False
         self._is_reading = False
@@ -273,6 +279,7 @@ class Turns:
         if self._protocol.in_doubt:
             self._begin_doubt()
         if exchange is not None:
+            self._times_in_vain = 0
             self._end(exchange, outcome)
 
     def _end(self, exchange: Exchange, outcome: TurnOver) -> None:
@@ -289,7 +296,9 @@ class Turns:
         self._may_send_ahead = True
 
     def _ensure_doubt_is_pursued(self) -> None:
-        if not self._is_pursuing and self._protocol.in_doubt and not self._protocol.is_busy and not self._markers_left:
+        is_babble = self._times_in_vain >= _MOST_IN_VAIN
+        is_needed = not self._is_pursuing and self._protocol.in_doubt and not self._markers_left
+        if is_needed and not self._protocol.is_busy and not is_babble:
             self._begin_doubt()
 
     def _pursue_doubt(self) -> bool:
@@ -324,6 +333,7 @@ class Turns:
 
     def _end_doubt(self) -> None:
         self._stats.resynchronisations += 1
+        self._times_in_vain += 1
         self._markers_left = 0
         self._is_pursuing = False
         self._grace.cancel()
@@ -337,6 +347,8 @@ class Turns:
             self.fail_waiting(partial(self._failures.hold, hold), but=self._spares)
         elif (stranger := self._protocol.stranger(time_is_over=True)) is not None:
             self.fail_waiting(partial(self._failures.stranger, stranger), but=self._spares)
+        elif self._times_in_vain >= _MOST_IN_VAIN:
+            self.fail_waiting(partial(self._failures.babble, self._times_in_vain), but=self._spares)
         else:
             self._on_silence()
             self.fail_waiting(self._failures.silence, but=self._spares)
@@ -349,7 +361,7 @@ class Turns:
     ) -> None:
         """Fail everything that waits, the opening too; those for which *but* holds are queued anew."""
         self._grace.cancel()
-        self._markers_left = 0
+        self._markers_left = self._times_in_vain = 0
         self._is_pursuing = False
         waiting = [exchange for exchange in (self._doubtful, self._outstanding) if exchange is not None]
         waiting += [exchange for exchange, _ in self._unproved] + self.queue.take_all()
