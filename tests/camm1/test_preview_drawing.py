@@ -113,7 +113,7 @@ def test_a_circle_is_cut_around_where_the_tool_stands_and_leaves_it_there_as_it_
 
 def test_a_shape_leaves_the_tool_down_if_it_was() -> None:
     assert drawn("PU1000,1000;PD;CI400;").ends_down
-    assert cuts("PU10,10;PD;EA30,20;PD10,0;PU;")[-1] == [(10, 10), (10, 0)]
+    assert cuts("PU10,10;PD;EA30,20;PD10,0;PU;")[-1][-2:] == [(10, 10), (10, 0)]
 
 
 def test_the_chord_of_a_circle_is_its_second_number() -> None:

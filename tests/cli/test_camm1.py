@@ -303,7 +303,7 @@ def test_an_abort_that_nobody_confirms_is_told_as_such(compax: Compax, on_stage:
 
 def test_a_pause_at_the_panel_is_told_and_waited_for(compax: Compax, on_stage: Plan) -> None:
     on_stage(5.0, lambda cutter: cutter.press_pause())
-    on_stage(200.0, lambda cutter: cutter.press_pause())
+    on_stage(70.0, lambda cutter: cutter.press_pause())
     code, text = compax("cut", CUTTER, "long.plt", "--yes")
     assert code == 0
     assert "long.plt: cutting long.plt: paused at the panel long.plt: cutting" in text
