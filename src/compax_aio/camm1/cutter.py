@@ -4,10 +4,18 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from types import TracebackType
-from typing import Final, Self
+from typing import Final, Self, TypeVar
 
-from ..errors import ConnectionLostError, InvalidCommandError, MoveInDoubtError, UnexpectedAnswerError
+from ..errors import (
+    AnswerTimeoutError,
+    ConnectionLostError,
+    InvalidCommandError,
+    MoveInDoubtError,
+    UnexpectedAnswerError,
+)
 from ..escaping import shown
 from ..link.cancellation import despite_cancellation
 from ..link.contract import Event, Lane
@@ -42,6 +50,9 @@ __all__ = ["Cutter"]
 
 _log = logging.getLogger("compax_aio.camm1")
 
+_T = TypeVar("_T")
+
+_ATTEMPTS: Final = 3
 _IDENTITY: Final = "OI"
 
 
@@ -202,7 +213,7 @@ class Cutter:
             CommandRejectedError, UnexpectedAnswerError, AnswerTimeoutError, ConnectionLostError: It may not be done.
         """
         self._refuse_in_job("ESC.R")
-        await self._line.tell(reset_words(self.profile, self._line.protocol.output_format), what="the reset")
+        await self._line.tell(reset_words(self.profile), what="the reset")
 
     @property
     def in_doubt(self) -> str | None:
@@ -342,22 +353,25 @@ class Cutter:
     # What the line tells --------------------------------------------------------------------------------------------
 
     async def _greet(self) -> None:
-        """Forget what others have set up, and look who is there."""
+        """Forget what others have set up, and look who is there; an answer or two may get lost."""
         line, lane = self._line, Lane.GREETING
-        await line.tell(reset_words(self.profile, line.protocol.output_format), lane, what="what sets up the line")
-        self.errors_found = await line.errors(lane)
+        self.errors_found = await _patiently(lambda: line.errors(lane))  # of others: before one can be ours
         for code in self.errors_found:
             _log.info("%s: error %d of the line was told when it was opened", self.name, code)
-        status = await line.status(lane)
+        await _patiently(lambda: line.tell(reset_words(self.profile), lane, what="what sets up the line"))
+        status = await _patiently(lambda: line.status(lane))
         if not line.protocol.has_signs:
             _log.warning(
                 "%s puts no sign in front of its replies (ESC.M P6): late ones are told by their time alone, and "
                 "nobody sees that it was switched off and on",
                 self.name,
             )
-        self._compare(await self._ask_identity(lane))
+        await _patiently(self._look_who_is_there)
         if status.buffer_is_empty:
-            self.capacity_bytes = max(await line.free_space(lane), self.capacity_bytes or 0)
+            self.capacity_bytes = max(await _patiently(lambda: line.free_space(lane)), self.capacity_bytes or 0)
+
+    async def _look_who_is_there(self) -> None:
+        self._compare(await self._ask_identity(Lane.GREETING))
 
     async def _ask_identity(self, lane: Lane) -> str | None:
         if "A" in self.profile.controls and self.profile.model_answer is not None:
@@ -411,3 +425,11 @@ class Cutter:
 
     def _on_lost(self, error: ConnectionLostError) -> None:
         self._on_down(error)
+
+
+async def _patiently(question: Callable[[], Awaitable[_T]]) -> _T:
+    """Ask a few times, if need be; a line on which nobody answers at all raises at once, when it is opened."""
+    for _ in range(_ATTEMPTS - 1):
+        with suppress(AnswerTimeoutError, UnexpectedAnswerError):
+            return await question()
+    return await question()

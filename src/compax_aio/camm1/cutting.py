@@ -129,7 +129,7 @@ class Cutting:
         self._burst: Burst | None = None
         self._began_at = self._watched_at = self._loop.time()
         self._resets_before = line.resets_seen
-        self._unread_before = line.unread_errors
+        self._unread_before = 0
         self._is_begun = False
         self._loss: ConnectionLostError | None = None
         self._why_aborted: str | None = None
@@ -271,7 +271,7 @@ class Cutting:
 
     async def _begin(self) -> None:
         """Look whether the machine is free, check the job, and establish the handshake."""
-        status = await self._watch.status()
+        status = await self._watch.until_not_held()
         if not status.buffer_is_empty:
             raise self._reports.not_empty(self._order.description)
         capacity = await self._watch.free_space()
@@ -279,12 +279,14 @@ class Cutting:
         handshake, self._because = self._choose()
         self._pacing = pacing = pacing_of(handshake, self._line.room_of(capacity))
         profile = self._line.profile
-        words = handshake_words(pacing, profile, self._line.protocol.output_format)
+        words = handshake_words(pacing, profile)
         await self._examine(capacity)
         self._resets_before = self._line.resets_seen
+        self._line.on_status = self._watch.note_status
         self._note_earlier_errors(await self._watch.ask(self._line.errors))
         await self._watch.ask(lambda: self._line.tell(words, what=f"the handshake {handshake!r}"))
         self._line.protocol.pacing = pacing
+        self._unread_before = self._line.unread_errors
         self._publish(CutBegun(self._line.name, self._loop.time(), self._order.description, handshake))
 
     def _choose(self) -> tuple[Handshake, str]:
@@ -495,6 +497,7 @@ class Cutting:
         self._state = "over"
         self.is_under_way = False
         self._line.protocol.pacing = None
+        self._line.on_status = lambda _: None
         await self._order.source.close()
         if self._stop_error is not None or isinstance(error, MoveInDoubtError):
             self._on_doubt(getattr(error, "what", str(error)))

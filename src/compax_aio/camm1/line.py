@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from typing import Final, TypeVar
 
 from ..errors import CommandRejectedError, CompaxError, ConnectionLostError, TransportError, UnexpectedAnswerError
@@ -19,7 +20,7 @@ from .instructions import AbortCutting, AskError, AskFreeSpace, AskModel, AskSta
 from .pacing import Room
 from .profiles import Profile
 from .protocol import Burst, CutterProtocol, LineLevel
-from .protocol_events import Answered, BurstOver, CutShort, SettingsLost, Unreadable
+from .protocol_events import Answered, BurstOver, CutShort, SettingsLost, StatusSeen, Unreadable
 from .replies import CutterStatus, decode_bytes, decode_error, decode_status
 from .settings import CutterSettings
 
@@ -67,6 +68,8 @@ class CutterLine:
         """How often an answer to ``.E`` did not come whole: reading clears, so an error may have gone with it."""
         self.resets_seen = 0
         """How often the cutter was found to have forgotten its settings."""
+        self.on_status: Callable[[CutterStatus], None] = lambda _: None
+        """Called with the status that was told when the line got in step."""
         self._status_text = encode(AskStatus(), profile).decode()
         self._free_text = encode(AskFreeSpace(), profile).decode()
         self._error_text = encode(AskError(), profile).decode()
@@ -164,7 +167,16 @@ class CutterLine:
         """
         code = await self._told_error(text + self._error_text, lane)
         error = IO_ERRORS.get(code)
-        if code != NO_ERROR and (error is None or error.refuses_control):
+        if error is None:  # a digit of it is damaged, perhaps
+            self.unread_errors += 1
+            raise UnexpectedAnswerError(
+                f"the cutter has told {meaning_of(code)}",
+                device=self.name,
+                sent=text,
+                received=str(code),
+                exchanges=self.link.recent(),
+            )
+        if error.refuses_control:
             raise CommandRejectedError(
                 f"the cutter has not taken {what or 'it'}: {meaning_of(code)}",
                 device=self.name,
@@ -228,6 +240,10 @@ class CutterLine:
     # What comes unasked ---------------------------------------------------------------------------------------------
 
     def _take_event(self, event: Event) -> None:
+        if isinstance(event, StatusSeen):
+            with suppress(UnexpectedAnswerError):
+                self.on_status(self._decode_status(event.text))
+            return
         if isinstance(event, SettingsLost):
             self.resets_seen += 1
         self._on_event(event)

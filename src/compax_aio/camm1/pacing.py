@@ -53,6 +53,8 @@ _LARGE_RESERVE_BYTES: Final = 128
 _SMALLEST_BUFFER_BYTES: Final = 32
 _MOST_THRESHOLD_BYTES: Final = 384
 _LEAST_SLACK_BYTES: Final = 8
+_ONE_PAIR_BYTES: Final = 24
+"""``PD-1234567,-1234567;`` and some blanks."""
 _LOOK_EVERY_BYTES: Final = 2048
 """Where no answer is needed to go on, it is asked so often whether all has arrived."""
 
@@ -326,7 +328,7 @@ class SoftwareChecking(_Credit):
     @property
     def longest_bytes(self) -> int:
         """Lists of coordinates are cut into instructions of so many bytes at most."""
-        return min(self.room.window_bytes, self.room.usable_bytes) // 2
+        return _two_of(min(self.room.window_bytes, self.room.usable_bytes))
 
     @property
     def most_bytes(self) -> int:
@@ -371,7 +373,7 @@ class EnqAck(_Credit):
     @property
     def longest_bytes(self) -> int:
         """Lists of coordinates are cut into instructions of so many bytes at most."""
-        return self.block_bytes // 2
+        return _two_of(self.block_bytes)
 
     @property
     def most_bytes(self) -> int:
@@ -402,7 +404,7 @@ class _Stopped(Pacing):
     @property
     def longest_bytes(self) -> int:
         """Lists of coordinates are cut into instructions of so many bytes at most."""
-        return self.most_unsent_bytes // 2
+        return min(_two_of(self.most_unsent_bytes), self.most_bytes)
 
     @property
     def most_bytes(self) -> int:
@@ -472,6 +474,11 @@ class Hardwire(_Stopped):
 
     handshake: Handshake = "hardwire"
     may_hold_line = True
+
+
+def _two_of(size: int) -> int:
+    """Return what two instructions may have that are on their way together; one pair of coordinates at least."""
+    return min(size, max(size // 2, _ONE_PAIR_BYTES))
 
 
 def pacing_of(handshake: Handshake, room: Room) -> Pacing:

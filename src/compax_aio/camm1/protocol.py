@@ -24,11 +24,11 @@ from ..errors import LinkProtocolError
 from ..link.contract import Event, GoesOn, Hold, InStep, LateEnding, Stranger
 from .facts.line import CARRIAGE_RETURN, ESCAPE, LINE_FEED
 from .pacing import FLOW_SIGNS, HEARD, Doing, Pacing
-from .protocol_events import Answered, BurstOver, CutShort, SettingsLost, Stray, Unreadable
+from .protocol_events import Answered, BurstOver, CutShort, SettingsLost, StatusSeen, Stray, Unreadable
 from .protocol_states import BUSY, DOUBTFUL, TRANSITIONS, State, Step
 from .settings import CutterSettings
 
-__all__ = ["SIGNS", "Burst", "CutterProtocol", "LineLevel"]
+__all__ = ["AGREED_FORMAT", "SIGNS", "Burst", "CutterProtocol", "LineLevel"]
 
 SIGNS: Final = "#$%&*=@~"
 """None of them stands in a reply, in an acknowledgement, or in a number of a parameter list."""
@@ -36,6 +36,9 @@ SIGNS: Final = "#$%&*=@~"
 _ESC: Final = chr(ESCAPE)
 ABORT_OUTPUT: Final = f"{_ESC}.J"
 ABORT_JOB: Final = f"{_ESC}.K"
+
+AGREED_FORMAT: Final = f"{_ESC}.M:"
+"""Stands in a text for the form of replies that is agreed on when it is sent, behind something that resets it."""
 
 _MOST_OF_A_REPLY: Final = 80
 _MOST_OF_A_STRAY: Final = 64
@@ -128,6 +131,9 @@ class CutterProtocol:
         self._has_signs = has_signs
         self._has_signed = False
         self._sign = SIGNS[-1]
+        """That was said last; until a reply bears it, the cutter may not have heard of it …"""
+        self._signs_said = ""
+        """… and know none but one of these."""
         self._is_agreed = False
         """Whether the cutter has been told how replies shall look, and has shown that it knows."""
         self._markers = 0
@@ -198,12 +204,6 @@ class CutterProtocol:
         """Whether replies bear a sign; if not, late ones are told by their time alone, and power cycles go unseen."""
         return self._has_signs
 
-    @property
-    def output_format(self) -> str:
-        """The form of replies that was agreed on, to be said again after something that resets it."""
-        sign = ord(self._sign) if self._has_signs else 0
-        return f"{_ESC}.M{self._settings.turnaround_ms};0;0;{CARRIAGE_RETURN};0;{sign}:"
-
     # What the link does ---------------------------------------------------------------------------------------------
 
     def line_opened(self) -> None:
@@ -239,7 +239,7 @@ class CutterProtocol:
             self._go_on(is_begin=True)
         else:
             self._step(Step.QUERY_SENT)
-            self._write(text)
+            self._write(text.replace(AGREED_FORMAT, self._format()))
 
     def send_marker(self) -> None:
         """Abort output, and ask in the old form; on a new line, agree on a form at once."""
@@ -253,8 +253,9 @@ class CutterProtocol:
             self._agree()
 
     def send_ahead(self, text: str) -> None:
-        """Send *text*, a stop, although in doubt; a marker follows it."""
-        self._write(text)
+        """Send the ``.K`` of *text*, a stop, although in doubt; what it asks would be asked too early. A marker follows."""
+        if text.startswith(ABORT_JOB):
+            self._write(ABORT_JOB)
         self._clear()
 
     def _clear(self) -> None:
@@ -355,13 +356,14 @@ class CutterProtocol:
             self._read_plain(text)
 
     def _read_signed(self, sign: str, text: str) -> None:
-        if sign != self._sign:
-            self._note_late(text)
-        elif self.state is State.PROBING:
+        if self.state is State.PROBING and sign in self._signs_said:
+            self._events.append(StatusSeen(text))
             self._agree()
+        elif sign != self._sign:
+            self._note_late(text)
         elif self.state is State.SIGNING:
             self._has_signed = True
-            self._get_in_step()
+            self._get_in_step(text)
         elif self.state is State.DRAINING:
             self._note_late(text)
         else:
@@ -370,7 +372,7 @@ class CutterProtocol:
     def _read_plain(self, text: str) -> None:
         if not self._has_signs:
             if self.state is State.SIGNING:
-                self._get_in_step()
+                self._get_in_step(text)
             elif self.state is State.DRAINING:
                 self._note_late(text)
             else:
@@ -561,11 +563,19 @@ class CutterProtocol:
         self._is_plain = False
         if self._has_signs:
             self._sign = SIGNS[(SIGNS.index(self._sign) + 1) % len(SIGNS)]
-        self._write(self.output_format + self._status_query)
+            self._signs_said += self._sign
+        self._write(self._format() + self._status_query)
         self._events.append(GoesOn())
 
-    def _get_in_step(self) -> None:
+    def _format(self) -> str:
+        """Say the form of replies: a turnaround, no trigger, no echo, CR at the end and the sign in front."""
+        sign = ord(self._sign) if self._has_signs else 0
+        return f"{_ESC}.M{self._settings.turnaround_ms};0;0;{CARRIAGE_RETURN};0;{sign}:"
+
+    def _get_in_step(self, status: str) -> None:
         self._step(Step.SIGNED)
+        self._events.append(StatusSeen(status))
+        self._signs_said = self._sign
         self._is_agreed = True
         self._owes = False
         self._given_up = ""

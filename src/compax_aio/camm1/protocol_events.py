@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ..link.contract import Event, TurnLost, TurnOver
 
-__all__ = ["Answered", "BurstOver", "CutShort", "SettingsLost", "Stray", "Unreadable"]
+__all__ = ["Answered", "BurstOver", "CutShort", "SettingsLost", "StatusSeen", "Stray", "Unreadable"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +52,13 @@ class SettingsLost(Event):
 
     text: str
     """The reply that has shown it."""
+
+
+@dataclass(frozen=True, slots=True)
+class StatusSeen(Event):
+    """The status, as it was told when the line got in step."""
+
+    text: str
 
 
 @dataclass(frozen=True, slots=True)

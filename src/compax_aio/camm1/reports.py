@@ -84,6 +84,14 @@ class CutReports:
             "the rest of the job was not sent; begin anew when the machine is set up",
         )
 
+    def perhaps_cancelled(self, account: CutAccount) -> MoveInDoubtError:
+        """Report a machine that was paused, and went on, with nobody knowing whether its data was deleted then."""
+        return self._doubt(
+            "the cutter was paused, and when it went on its buffer was empty, or nobody could see what it held: its "
+            f"data may have been deleted, as PAUSE and SETUP at the machine do; {account}",
+            account,
+        )
+
     def stalled(self, seconds: float, account: CutAccount, *, is_held: bool) -> MoveTimeoutError:
         """Report a cutter that takes nothing, and is not paused."""
         if is_held:

@@ -24,10 +24,9 @@ _LOOK_WHEN_FULL_S: Final = 0.25
 """A cutter with a full buffer is asked so often whether it is paused …"""
 _LOOK_WHEN_UNKNOWN_S: Final = 1.0
 """… one that does not say how full it is, so often; a nearly empty buffer shows that it is not."""
-_PAUSED_POLL_S: Final = 0.1
+_PAUSED_POLL_S: Final = 0.01
+"""So soon a paused machine is asked again: what happens at its end is told by the first look after it."""
 _AGAIN_S: Final = 0.1
-_FEW_BYTES: Final = 48
-"""A few short instructions; they may be taken between two looks at a machine that goes on after a pause."""
 
 
 class MachineWatch:
@@ -70,6 +69,7 @@ class MachineWatch:
         self._check = check
         self._loop = asyncio.get_running_loop()
         self._seen: object = None
+        self._was_held = False
         self._changed_at = self._looked_at = self._loop.time()
         self._poll_s = self._settings.poll_first_s
 
@@ -164,10 +164,9 @@ class MachineWatch:
     async def _look_if_due(self, due_s: float) -> None:
         if self._loop.time() - self._looked_at < due_s:
             return
-        status = await self.status()
-        self._looked_at = self._loop.time()
+        status = await self._look()
         if _is_held(status):
-            await self._until_resumed()
+            await self._until_resumed(status)
         elif self.flat_s >= self._settings.stall_timeout_s:
             raise self._reports.stalled(self.flat_s, self._account(), is_held=False)
 
@@ -181,9 +180,9 @@ class MachineWatch:
         """
         self.restart()
         while True:
-            status = await self.status()
+            status = await self._look()
             if _is_held(status):
-                await self._until_resumed()
+                await self._until_resumed(status)
                 continue
             if status.buffer_is_empty:
                 return
@@ -193,26 +192,49 @@ class MachineWatch:
             await self.pause(self._poll_s)
             self._poll_s = min(2 * self._poll_s, self._settings.poll_slowest_s)
 
-    async def _until_resumed(self) -> None:
+    async def until_not_held(self) -> CutterStatus:
+        """Wait until nobody holds the machine, before a job is begun."""
+        while _is_held(status := await self.status()):
+            await self._until_resumed(status)
+        return status
+
+    async def _look(self) -> CutterStatus:
+        """
+        Read the status.
+
+        Raises:
+            MoveInDoubtError: It was paused while nobody could follow it, and is not any more.
+        """
+        status = await self.status()
+        self._looked_at = self._loop.time()
+        was_held, self._was_held = self._was_held, False
+        if was_held and not _is_held(status):
+            raise self._reports.perhaps_cancelled(self._account())
+        return status
+
+    def note_status(self, status: CutterStatus) -> None:
+        """Take note of a status that nobody here has asked for: it may be paused, unseen by others."""
+        self._was_held = self._was_held or _is_held(status)
+
+    async def _until_resumed(self, status: CutterStatus) -> None:
         """
         Wait as long as the operator wants, and see what he does.
 
-        A paused machine takes nothing. If space becomes free all the same, or the buffer is empty the moment it goes
-        on, its data was deleted: so PAUSE and SETUP end a job (PNC-900 p. 10).
+        A paused machine takes nothing. If it has become empty all the same, its data was deleted: so PAUSE and SETUP
+        end a job (PNC-900 p. 10). If it is empty the moment it goes on, that may be, too.
         """
         self._set_state("operator pause")
         self._publish(CutterPaused(self._line.name, self._loop.time()))
-        free = await self.free_space()
-        while True:
+        was_empty = status.buffer_is_empty
+        while _is_held(status):
             await self.pause(_PAUSED_POLL_S)
-            status, now_free = await self.status(), await self.free_space()
-            if _is_held(status) and now_free <= free:
-                continue
-            stored = self.capacity_bytes - free
-            is_deleted = now_free > free if _is_held(status) else status.buffer_is_empty and stored > _FEW_BYTES
-            if is_deleted:
-                raise self._reports.cancelled_at_machine(self._account())
-            break
+            status = await self.status()
+            if status.buffer_is_empty and not was_empty:
+                if _is_held(status):
+                    raise self._reports.cancelled_at_machine(self._account())
+                raise self._reports.perhaps_cancelled(self._account())
+            was_empty = status.buffer_is_empty
+        self._was_held = False
         self._publish(CutterResumed(self._line.name, self._loop.time()))
         self.restart()
 

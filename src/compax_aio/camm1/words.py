@@ -10,6 +10,7 @@ from .facts.line import DC1, DC3, ENQ
 from .instructions import BlockHandshake, Control, DtrControl, EnqAckMode1, PresetHandshake, Reset, SignFormat, encode
 from .pacing import ACKNOWLEDGEMENT, HEARD, EnqAck, Hardwire, Pacing, XonXoff
 from .profiles import Profile
+from .protocol import AGREED_FORMAT
 
 __all__ = ["handshake_words", "reset_words", "worded"]
 
@@ -27,15 +28,15 @@ def worded(controls: Iterable[Control], profile: Profile) -> str:
     return b"".join(encode(each, profile) for each in controls).decode("latin-1")
 
 
-def reset_words(profile: Profile, output_format: str) -> str:
+def reset_words(profile: Profile) -> str:
     """Say what forgets every handshake, where the machine has such a thing, and the form of replies again."""
     controls: list[Control] = []
     if "R" in profile.controls:
         controls.append(Reset())
-    return worded(controls, profile) + output_format + worded(_dtr(profile, is_on=False), profile)
+    return worded(controls, profile) + AGREED_FORMAT + worded(_dtr(profile, is_on=False), profile)
 
 
-def handshake_words(pacing: Pacing, profile: Profile, output_format: str) -> str:
+def handshake_words(pacing: Pacing, profile: Profile) -> str:
     """
     Say what establishes the handshake of *pacing*.
 
@@ -52,7 +53,7 @@ def handshake_words(pacing: Pacing, profile: Profile, output_format: str) -> str
             hint="choose another handshake; or add '@' to 'controls' of its profile, if it has ESC.@",
         )
     if is_hardwire and "@" not in profile.controls:
-        words = worded([PresetHandshake(_HARDWIRE_PRESET)], profile) + output_format
+        words = worded([PresetHandshake(_HARDWIRE_PRESET)], profile) + AGREED_FORMAT
     else:
         words = worded(_dtr(profile, is_on=is_hardwire), profile)
     return words + worded(_signals(pacing, profile), profile)
