@@ -27,7 +27,7 @@ _PATIENCE_S = 30.0
         ([], "no line was named"),
         (["x=sim://compax", "--interval", "0"], "--interval must be above 0"),
         (["x=sim://compax", "--step", "-1"], "--step must be above 0"),
-        (["x=sim://compax", "--jog-speed", "nan"], "--jog-speed must be finite"),
+        (["x=sim://compax", "--jog-speed", "nan"], "--jog-speed"),
         (["x=sim://compax", "--settings", "nowhere.toml"], "nowhere.toml cannot be read"),
         (["x=sim://compax"], "needs a terminal"),
     ],
@@ -170,3 +170,22 @@ async def test_a_stop_that_nobody_acknowledges_is_told_when_leaving_with_its_exi
         terminal.press("\x03")
         assert await terminal.ends() in {4, 8}
     assert "x: NOT KNOWN TO STAND, use the emergency stop if it moves" in terminal.seen
+
+
+@pytest.mark.real_time
+async def test_a_terminal_that_takes_nothing_keeps_no_key_from_stopping() -> None:
+    x = SimulatedDrive(Knobs(homed=True, nominal_speed=50), name="x")
+    async with serve_tcp(x) as url:
+        terminal = Terminal(f"x={url}", "--allow-motion", "--step", "3000", "--interval", "0.05")
+        await terminal.sees("STANDING")
+        terminal.press("m\x1b[C")
+        await terminal.sees("begun here")
+        asked = x.log.texts(LogKind.LINE).count("S1")
+        # From here on nobody reads what is drawn.
+        await until(lambda: x.log.texts(LogKind.LINE).count("S1") > asked + 200)
+        assert x.moving
+        terminal.press(" ")
+        await until(lambda: not x.moving)
+        await terminal.sees("acknowledged, and the axis stands")
+        terminal.press("q")
+        assert await terminal.ends() == 0
