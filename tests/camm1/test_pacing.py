@@ -294,7 +294,8 @@ def test_an_answer_that_nobody_waits_for_changes_nothing() -> None:
 
 def test_what_the_cutter_has_taken_is_what_it_was_sent_less_what_it_holds() -> None:
     pacing = software()
-    assert pacing.taken_bytes is None
+    before = pacing.taken_bytes
+    assert before is None
     ask(pacing, 1024)
     write(pacing, 12)
     pacing.next(10, 0)

@@ -385,7 +385,8 @@ class Turns:
     # Time -----------------------------------------------------------------------------------------------------------
 
     def _time_is_up(self) -> None:
-        if not self._protocol.is_busy:
+        was_busy = self._protocol.is_busy
+        if not was_busy:
             return
         self._protocol.time_ran_out()
         self._flush(Way.GOES_ON)
