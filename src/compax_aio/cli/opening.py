@@ -38,8 +38,11 @@ async def closing(close: Callable[[], Awaitable[None]]) -> AsyncIterator[None]:
         except CompaxError as on_leaving:
             error.add_note(f"as the line was closed: {on_leaving}")
         raise
-    finally:
-        await close()  # where it is closed already, nothing happens
+    except BaseException:
+        await close()
+        raise
+    else:
+        await close()
 
 
 @Parameter(name="*")

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from compax_aio import InvalidCommandError
+from compax_aio import AnswerTimeoutError, InvalidCommandError, MoveInDoubtError
 from compax_aio.smc import Listed
 from compax_aio.smc.program_text import instruction, parse_program, program_listing
 from compax_aio.smc.vocabulary import list_program, plan_program
@@ -185,7 +185,11 @@ async def run(
     check_manner(timeout_s, "stop")
     async with line.open_axis(url, axis) as programmed:
         running = programmed.axis.program.run(address, timeout_s=timeout_s)
-        await carry_out(programmed, running, printing, what=f"the program at {address} is over")
+        try:
+            await carry_out(programmed, running, printing, what=f"the program at {address} is over")
+        except (AnswerTimeoutError, MoveInDoubtError) as error:
+            error.add_note("If it moves: `compax smc stop URL --abort` is heard in a program, too, by every axis.")
+            raise
 
 
 def _expect_listing(line: SmcLine) -> None:
