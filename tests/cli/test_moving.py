@@ -102,7 +102,7 @@ def test_keys_move_and_leave(compax: Commands, x: SimulatedDrive, types: Callabl
     outcome = compax("jog", X, "--step", "5", "--name", "x")
     assert outcome.code == 0
     assert x.log.texts(LogKind.MOTION_STARTED) == ["POSR 5.00", "POSR 0.00"]  # by their targets
-    assert "x stands at 0.00 units." in outcome.told
+    assert "Nothing that was started here moves x; it is at 0.00 units." in outcome.told
 
 
 @pytest.mark.parametrize(("keys", "code"), [(b"\x1b", 0), (b"\x04", 0), (b"Q", 0), (b"\x03", 130)])

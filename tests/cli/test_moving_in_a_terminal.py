@@ -249,7 +249,7 @@ async def test_jogging_moves_stops_and_gives_the_terminal_back(
     await terminal.sees("stopped; it stands")
     assert not drive.moving
     terminal.types("\x1b")
-    await terminal.sees("nothing that was started here moves x")
+    await terminal.sees("Nothing that was started here moves x")
     assert termios.tcgetattr(terminal.child.child_fd)[3] & termios.ICANON
     code, _ = await terminal.ends()
     assert code == 0

@@ -63,10 +63,10 @@ async def _by_keys(drive: Drive, step: float, speed: float) -> int:
                 finally:
                     was_moving = await jogging.end()
                     stands = f"{drive.name} has acknowledged STOP and stands"
-                    rests = f"nothing that was started here moves {drive.name}"
-                    say_at_end(f"Interrupted: {stands if was_moving else rests}.")
+                    rests = f"Nothing that was started here moves {drive.name}"
+                    say_at_end(f"Interrupted. {stands if was_moving else rests}.")
     where = written(drive, await drive.position())
-    said = f"{stands} at {where}" if was_moving else f"{drive.name} is at {where}; {rests}"
+    said = f"{stands} at {where}" if was_moving else f"{rests}; it is at {where}"
     notes_console().print(f"{said}.", markup=False)
     return INTERRUPTED if jogging.is_interrupted else OK
 
