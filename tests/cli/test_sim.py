@@ -7,6 +7,7 @@ import io
 import json
 import os
 import re
+import subprocess
 import sys
 from collections.abc import AsyncIterator, Coroutine, Iterator
 from contextlib import asynccontextmanager
@@ -44,9 +45,9 @@ def typed(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     """Let a command find lines on its standard input, and virtual time."""
     files: list[IO[str]] = []
 
-    def type_lines(*lines: str) -> None:
+    def type_lines(*lines: str, ends_last: bool = True) -> None:
         read_end, write_end = os.pipe()
-        os.write(write_end, "".join(f"{line}\n" for line in lines).encode())
+        os.write(write_end, ("\n".join(lines) + "\n" * ends_last).encode())
         os.close(write_end)
         files.append(os.fdopen(read_end))
         monkeypatch.setattr(sys, "stdin", files[-1])
@@ -72,6 +73,12 @@ def test_service_ends_by_a_word(typed: Any, capsys: pytest.CaptureFixture[str]) 
     text = told(capsys)
     assert re.search(r"drive serial:///dev/\S+", text)
     assert "No device is served any more." in text
+
+
+def test_a_last_line_without_an_end_counts(typed: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    typed("where", "quit", ends_last=False)
+    assert app.run(["sim", "compax"]) == 0
+    assert "drive: 0.000 mm, standing" in told(capsys)
 
 
 def test_programs_read_the_urls_first(typed: Any, capsys: pytest.CaptureFixture[str]) -> None:
@@ -342,6 +349,41 @@ async def test_steppers_are_served_as_well() -> None:
         smc.connect(url, axes="XY", name="table") as line,
     ):
         assert (await line.axis("X").move_to(300)).target == 300
+
+
+@pytest.mark.real_time
+def test_who_reads_what_is_shown_may_go_away() -> None:
+    child = subprocess.Popen(
+        [sys.executable, "-m", "compax_aio.cli", "sim", "compax", "--json", "--tcp", "0"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert child.stdout is not None
+    json.loads(child.stdout.readline())
+    child.stdout.close()
+    _, told = child.communicate("estop\n", LIMIT_S)
+    assert (child.returncode, told) == (141, "")
+
+
+@pytest.mark.real_time
+@pytest.mark.skipif(not hasattr(os, "tcgetpgrp"), reason="there are no groups of processes here")
+@pytest.mark.parametrize("redirection", ["", " > served.txt"])
+def test_in_the_background_of_a_shell_devices_are_served_as_well(redirection: str, tmp_path: Path) -> None:
+    shell = pexpect.spawn("/bin/sh", ["-m", "-i"], env={**os.environ, "PS1": "$ "}, encoding="utf-8", timeout=LIMIT_S)
+    try:
+        link = tmp_path / "x"
+        shell.sendline(f"cd {tmp_path}; {sys.executable} -m compax_aio.cli sim compax --link {link}{redirection} &")
+        shell.expect_exact("Try `compax status")
+        shell.sendline(f"{sys.executable} -m compax_aio.cli status serial://{link} --json; echo ended with $?")
+        shell.expect_exact("ended with 0")
+        shell.sendline("kill -INT %1; wait %1; echo gone with $?")
+        shell.expect("gone with [0-9]+")
+        assert shell.after == "gone with 0"
+        assert not link.is_symlink()
+    finally:
+        shell.close(force=True)
 
 
 @pytest.mark.real_time

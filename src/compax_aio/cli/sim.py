@@ -117,8 +117,9 @@ async def _serve(
     devices: dict[str, Device], place: Place, faults: Faults, printing: Printing, *, is_quiet: bool, look: str
 ) -> int:
     """Serve *devices*, at which the command *look* looks, until somebody ends it; returns the exit code."""
-    loop = asyncio.get_running_loop()
-    view = SimView(printing, is_quiet=is_quiet, began_at=loop.time())
+    loop, task = asyncio.get_running_loop(), asyncio.current_task()
+    assert task is not None
+    view = SimView(printing, is_quiet=is_quiet, began_at=loop.time(), on_failure=task.cancel)
     far_ends: dict[str, FarEnd] = {}
     for number, (name, device) in enumerate(devices.items()):
 
@@ -137,6 +138,8 @@ async def _serve(
                 each.start_timetable()
             with suppress(asyncio.CancelledError):  # Ctrl-C is how service ends
                 await _until_end(Hands(far_ends), printing, is_conversation=is_conversation)
+    if view.failure is not None:
+        raise view.failure
     printing.note("No device is served any more." if place.state is None else f"The state is in {place.state}.")
     return OK
 

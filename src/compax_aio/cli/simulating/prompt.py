@@ -20,8 +20,16 @@ _LONGEST_LINE: Final = 65_536
 
 
 def _is_conversation() -> bool:
-    """Whether a person sits at both ends."""
-    return sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
+    """Whether a person sits at both ends, and can type here."""
+    return sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty() and not _is_in_background()
+
+
+def _is_in_background() -> bool:
+    """Whether the shell has put us behind something else: who reads from the terminal then is stopped by the system."""
+    try:
+        return os.getpgrp() != os.tcgetpgrp(sys.stdin.fileno())
+    except (AttributeError, OSError, ValueError):  # no such terminal, or no such system
+        return False
 
 
 @contextmanager
@@ -64,6 +72,8 @@ async def _read_lines(hands: Hands, say: Callable[[str], None]) -> None:
         stdin = sys.stdin.fileno()
     except (AttributeError, OSError, ValueError):
         return
+    if os.isatty(stdin) and _is_in_background():
+        return
     lines: asyncio.Queue[str | None] = asyncio.Queue()
     loop = asyncio.get_running_loop()
 
@@ -76,6 +86,7 @@ async def _read_lines(hands: Hands, say: Callable[[str], None]) -> None:
                 rest = rest[-_LONGEST_LINE:]
                 for each in whole:
                     loop.call_soon_threadsafe(lines.put_nowait, each.decode("utf-8", "replace"))
+            loop.call_soon_threadsafe(lines.put_nowait, rest.decode("utf-8", "replace"))
             loop.call_soon_threadsafe(lines.put_nowait, None)
 
     threading.Thread(target=read, daemon=True, name="reads the standard input").start()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Final
 
@@ -77,13 +77,21 @@ class SimView:
         printing: For people or programs.
         is_quiet: Nothing but what was asked for.
         began_at: The time from which times are counted.
+        on_failure: Called once, when nothing can be printed any more.
+
+    Attributes:
+        failure: Why nothing can be printed any more; None: it can.
     """
 
-    def __init__(self, printing: Printing, *, is_quiet: bool, began_at: float) -> None:
+    def __init__(
+        self, printing: Printing, *, is_quiet: bool, began_at: float, on_failure: Callable[[], object] = lambda: None
+    ) -> None:
         self._printing = printing
         self._is_quiet = is_quiet
         self._began_at = began_at
+        self._on_failure = on_failure
         self._name_width = 0
+        self.failure: OSError | None = None
         self._next_at: dict[str, float] = {}
         self._left_out: dict[str, int] = {}
 
@@ -121,9 +129,15 @@ class SimView:
         return round(at - self._began_at, 3)
 
     def _show(self, seen: _Seen) -> None:
-        self._printing.show(
-            {key: value for key, value in asdict(seen).items() if value not in {None, ""}}, self._told(seen)
-        )
+        if self.failure is not None:
+            return
+        try:
+            self._printing.show(
+                {key: value for key, value in asdict(seen).items() if value not in {None, ""}}, self._told(seen)
+            )
+        except OSError as error:  # which is no business of the device that has just done something
+            self.failure = error
+            self._on_failure()
 
     def _told(self, seen: _Seen) -> Text:
         mark, style = _LOOKS.get(seen.kind, _LIFE)
