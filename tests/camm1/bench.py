@@ -63,6 +63,10 @@ class Bench:
         for each in tuple(self.connections):
             each.abort()
 
+    def fail(self, code: int) -> None:
+        """Have the machine note an error of the line, as for a reason that shows nowhere else."""
+        self.far._inside.note_io_error(code, now())
+
 
 @asynccontextmanager
 async def bench(

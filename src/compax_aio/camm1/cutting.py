@@ -193,11 +193,12 @@ class Cutting:
         Raises:
             CompaxError: The machine may not have stopped.
         """
+        is_told = self.cut.done() and not self.cut.cancelled()
         if self._order.on_cancel == "abort":
             self.request_abort("aborted, for its cutter was closed")
         self._may_send.set()
         await asyncio.wait([self.task])
-        if self._stop_error is not None:
+        if self._stop_error is not None and not is_told:
             raise self._stop_error
 
     def note_lost(self, error: ConnectionLostError) -> None:
@@ -272,7 +273,7 @@ class Cutting:
     async def _begin(self) -> None:
         """Look whether the machine is free, check the job, and establish the handshake."""
         status = await self._watch.until_not_held()
-        if not status.buffer_is_empty:
+        if not status.buffer_is_empty and not (await self._watch.status()).buffer_is_empty:  # one look may be damaged
             raise self._reports.not_empty(self._order.description)
         capacity = await self._watch.free_space()
         self._watch.capacity_bytes = capacity

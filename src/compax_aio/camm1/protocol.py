@@ -253,7 +253,7 @@ class CutterProtocol:
             self._agree()
 
     def send_ahead(self, text: str) -> None:
-        """Send the ``.K`` of *text*, a stop, although in doubt; what it asks would be asked too early. A marker follows."""
+        """Send the ``.K`` of *text*, a stop, although in doubt, and a marker: what it asks would be asked too early."""
         if text.startswith(ABORT_JOB):
             self._write(ABORT_JOB)
         self._clear()

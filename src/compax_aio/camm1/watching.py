@@ -111,7 +111,8 @@ class MachineWatch:
         Raises:
             MoveInDoubtError: The line is lost, or the cutter says nothing any more.
         """
-        give_up_at = self._loop.time() + self._settings.stall_timeout_s
+        asked_at = self._loop.time()
+        give_up_at = asked_at + self._settings.stall_timeout_s
         while True:
             try:
                 answer = await question()
@@ -124,6 +125,7 @@ class MachineWatch:
                 raise self._reports.lost(error, self._account()) from error
             else:
                 self._check()
+                self._changed_at += self._loop.time() - asked_at  # meanwhile nobody could see whether anything changes
                 return answer
             await self.pause(_AGAIN_S)
 
