@@ -198,8 +198,9 @@ async def test_progress_tells_how_far_it_is_from_its_start_to_its_end() -> None:
         watching = asyncio.create_task(watched(cut))
         await cut
         seen = await watching
-        assert seen[0].state == "starting"
-        assert {"cutting", "finishing", "over"} <= {each.state for each in seen}
+        states: list[str] = [each.state for each in seen]
+        assert states[0] == "starting"
+        assert {"cutting", "finishing", "over"} <= set(states)
         last: CutProgress = seen[-1]
         assert (last.bytes_sent, last.bytes_total) == (len(job), len(job))
         assert last.instructions_sent == last.instructions_total

@@ -266,7 +266,7 @@ def test_a_sudden_jump_of_free_space_is_asked_for_twice_and_the_lesser_answer_co
     write(pacing, 1)
     pacing.next(10, 0)
     pacing.asked()
-    assert pacing.answered(964)  # "0164" with a damaged digit
+    assert pacing.answered(364)  # "164" with a damaged digit
     assert pacing.next(10, 0) is Doing.ASK
     pacing.asked()
     assert pacing.next(10, 0) is Doing.AWAIT  # it is not believed yet

@@ -10,7 +10,7 @@ from typing import Final
 from ..errors import AnswerTimeoutError, CompaxError, ConnectionLostError, MoveTimeoutError
 from ..link.contract import Lane
 from .line import CutterLine
-from .replies import CutterStatus
+from .replies import CutterStatus, Position, decode_position
 
 __all__ = ["Aborting"]
 
@@ -51,9 +51,10 @@ class Aborting:
         await self._until_empty()
         status = await self._lift(";^PU;" if lifts_with_call else _LIFT)
         if not status.is_paused:  # else it goes up when somebody lets the machine go on
-            status = await self._until_empty()
+            await self._until_empty()
+            await self._until_up("^" if lifts_with_call else "")
         await self._line.errors(Lane.CONTROL)
-        return status
+        return await self._line.status(Lane.STOP)
 
     async def _until_heard(self) -> None:
         """Repeat ``.K`` until the line is in step after it: it does no harm when it comes twice."""
@@ -107,6 +108,36 @@ class Aborting:
                 if self._line.link.is_over or self._loop.time() >= self._give_up_at:
                     raise
             await asyncio.sleep(_PAUSE_S)
+
+    async def _until_up(self, call: str) -> None:
+        """Wait until the tool is up and where it was before: an empty buffer is no vector that has come to its end."""
+        if "OA" not in self._line.profile.mnemonics:
+            return
+        before: Position | None = None
+        while True:
+            try:
+                async with asyncio.timeout_at(self._give_up_at):
+                    now = await self._line.read(f"{call}OA;", decode_position, Lane.STOP, repeats=False)
+            except TimeoutError:
+                raise self._not_up() from None
+            except CompaxError:
+                if self._line.link.is_over or self._loop.time() >= self._give_up_at:
+                    raise
+                now = None
+            if now is not None and now == before and not now.tool_is_down:
+                return
+            if self._loop.time() >= self._give_up_at:
+                raise self._not_up()
+            before = now
+            await asyncio.sleep(_PAUSE_S)
+
+    def _not_up(self) -> MoveTimeoutError:
+        return MoveTimeoutError(
+            f"ESC.K was heard, but within {self._line.settings.stop_timeout_s:g} s the tool was not up and at rest",
+            device=self._line.name,
+            hint="the vector under way is cut to its end; is the machine paused? Look at it, then stop() again",
+            exchanges=self._line.link.recent(),
+        )
 
     def _not_heard(self) -> AnswerTimeoutError:
         return AnswerTimeoutError(

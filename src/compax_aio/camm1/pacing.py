@@ -314,7 +314,8 @@ class SoftwareChecking(_Credit):
     """
     Free space is asked for with ``.B`` (DXY p. 5-10; HP7470 p. 10-26), and less than that is sent.
 
-    A sudden jump of it is asked for twice: a digit that was damaged on the line could make the buffer overflow.
+    When it rises by more than is kept free it is asked for twice, and the lesser answer counts: a digit damaged
+    on the line would make the buffer overflow otherwise.
     """
 
     handshake: Handshake = "software"
@@ -323,7 +324,7 @@ class SoftwareChecking(_Credit):
     def __init__(self, room: Room) -> None:
         super().__init__(room)
         self._suspect: float | None = None
-        self._has_answered = False
+        self._believed_bytes = room.capacity_bytes
 
     @property
     def longest_bytes(self) -> int:
@@ -337,14 +338,14 @@ class SoftwareChecking(_Credit):
 
     def _note_free(self, free_bytes: int, asked_at: int) -> None:
         limit = asked_at + free_bytes - self.room.reserve_bytes
-        jump = limit - self._limit_bytes
         if self._suspect is not None:
-            limit, self._suspect = min(limit, int(self._suspect)), None
-        elif self._has_answered and jump > self.room.capacity_bytes // 2:
-            self._suspect, limit = limit, int(self._limit_bytes)
-            self._wants_to_ask = True
-        self._has_answered = True
-        self._limit_bytes = limit
+            self._limit_bytes, self._suspect = min(limit, self._suspect), None
+        elif free_bytes - self._believed_bytes > self.room.reserve_bytes:
+            self._suspect, self._wants_to_ask = limit, True
+            return
+        else:
+            self._limit_bytes = limit
+        self._believed_bytes = free_bytes
 
 
 class EnqAck(_Credit):
