@@ -35,13 +35,17 @@ from compax_aio.simulator.state_file import write_state_file
 pytestmark = [pytest.mark.real_time, pytest.mark.filterwarnings("ignore:.*multi-threaded:DeprecationWarning")]
 
 DRIVES = 6
-LINES = 4
+LINES = 6
 """So many are served, for cells at the same time."""
+
+IN_DOUBT = 8
 
 CTRL_C = "\x03"
 AT_FAR_END = "far end: "
 SILENT, UNPLUG = f"{AT_FAR_END}silent", f"{AT_FAR_END}unplug"
 HEARD, ON_ITS_WAY = f"{AT_FAR_END}line", f"{AT_FAR_END}motion_started"
+ASKED_MEANWHILE = f"{AT_FAR_END}line after motion_started"
+"""Then who has set it in motion knows that the drive has taken it: one exchange at a time."""
 FALLS_SILENT, IS_UNPLUGGED = ("", SILENT), ("", UNPLUG)
 _CONTROL = re.compile(r"\x1b\[[0-9;?<>=]*[A-Za-z~]|\x1b\][^\x07]*\x07|\x1b[=>78M()][AB0]?")
 _MODE = re.compile(r"\x1b\[\?([0-9;]+)([hl])")
@@ -119,7 +123,9 @@ def carry_out(cell: Cell, far: FarEnd, folder: Path, number: int) -> Outcome:
         encoding="utf-8",
         dimensions=(40, 200),
         timeout=LIMIT_S,
+        maxread=65_536,
     )
+    child.delaybeforesend = None
     shown: list[str] = []
     child.logfile_read = type("Log", (), {"write": lambda _, text: shown.append(text), "flush": lambda _: None})()
     try:
@@ -150,7 +156,7 @@ def expect(what: str, child: pexpect.spawn[str], far: FarEnd) -> None:
     if kind == what:
         child.expect(what)
     else:
-        far.sees(kind)
+        far.sees(*reversed(kind.split(" after ")))
 
 
 def act(what: str, child: pexpect.spawn[str], far: FarEnd) -> None:
@@ -183,7 +189,9 @@ PATIENT = "--settings {dir}/patient.toml"
 """Answers have all the time they want, and a lost line is given up soon."""
 
 INTERRUPTED = (r"Interrupted\.",)
-STOPPED = (r"has acknowledged STOP and stands at -?[0-9.]+ units|Stopped: \S+; it stands",)
+STOPPED = (
+    r"has acknowledged STOP and stands at -?[0-9.]+ units|Stopped: \S+; it stands|Nothing goes on that this command had set in motion",
+)
 NO_PORT = (r"there is no serial port .*-nowhere", r"ports of this computer")
 NO_ANSWER = (r"check power|is the drive powered", r"baud")
 LOST = (
@@ -255,8 +263,8 @@ def cells() -> Iterator[Cell]:
         yield cell("Ctrl-C", does=CTRL_C, code=130, says=INTERRUPTED)
     for name, words in MOVING.items():
         cell = partial(Cell, name, words, PATIENT, when=ON_ITS_WAY)
-        yield cell("silent on its way", does=SILENT, code=8, says=DOUBT)
-        yield cell("unplugged on its way", does=UNPLUG, code=8, says=DOUBT, leaves="moving")
+        yield cell("silent on its way", does=SILENT, code=IN_DOUBT, says=DOUBT)
+        yield cell("unplugged on its way", does=UNPLUG, code=IN_DOUBT, says=DOUBT, leaves="moving")
         yield cell("Ctrl-C", does=CTRL_C, code=130, says=STOPPED)
     yield from sitting()
     yield from at_the_monitor()
@@ -280,8 +288,8 @@ def on_a_party_line() -> Iterator[Cell]:
         yield cell("Ctrl-C", does=CTRL_C, code=130, says=INTERRUPTED)
     for name, words in AXES_MOVING.items():
         cell = partial(Cell, name, words, "", device="axes", when=ON_ITS_WAY)
-        yield cell("silent on its way", does=SILENT, code=8, says=DOUBT)
-        yield cell("unplugged on its way", does=UNPLUG, code=8, says=DOUBT, leaves="moving")
+        yield cell("silent on its way", does=SILENT, code=IN_DOUBT, says=DOUBT)
+        yield cell("unplugged on its way", does=UNPLUG, code=IN_DOUBT, says=DOUBT, leaves="moving")
         if name == "smc program run":  # in which an axis may hear nothing (DCB p. 27)
             yield cell(
                 "Ctrl-C",
@@ -293,9 +301,9 @@ def on_a_party_line() -> Iterator[Cell]:
         else:
             yield cell("Ctrl-C", does=CTRL_C, code=130, says=(r"has acknowledged STOP and stands at -?[0-9.]+ steps",))
     watch = partial(Cell, "smc status --watch", ("smc status", "X --watch"), "", device="axes", when="stands")
-    yield watch("silent", does=SILENT, then=(("no sensible answer", CTRL_C),), code=130, says=("0 steps",))
-    yield watch("unplugged", does=UNPLUG, then=(("the line was lost", CTRL_C),), code=130, says=("0 steps",))
-    yield watch("Ctrl-C", does=CTRL_C, code=130, says=("0 steps",))
+    yield watch("silent", does=SILENT, then=(("no sensible answer", CTRL_C),), code=130, says=(r"[0-9]+ steps",))
+    yield watch("unplugged", does=UNPLUG, then=(("the line was lost", CTRL_C),), code=130, says=(r"[0-9]+ steps",))
+    yield watch("Ctrl-C", does=CTRL_C, code=130, says=(r"[0-9]+ steps",))
 
 
 def without_a_line() -> Iterator[Cell]:
@@ -326,7 +334,7 @@ def sitting() -> Iterator[Cell]:
         code=130,
         says=("Ctrl-C ends this",),
     )
-    yield watch("unplugged", does=UNPLUG, then=((r"lost", CTRL_C),), code=130, says=("is tried again",))
+    yield watch("unplugged", does=UNPLUG, then=(("is tried again", CTRL_C),), code=130, says=("was lost",))
     yield watch("Ctrl-C", does=CTRL_C, code=130, says=("Ctrl-C ends this",))
     record = partial(Cell, "record", SITTING["record"], PATIENT, when="values")
     yield record("silent", does=SILENT, then=((r"not answered", CTRL_C),), code=0, says=("not said",))
@@ -341,17 +349,17 @@ def sitting() -> Iterator[Cell]:
     shell = partial(Cell, "shell", SITTING["shell"], PATIENT + " --allow-motion --name x", when="exit leaves")
     yield shell("silent", does=SILENT, then=(("", "S1\r"), (NO_ANSWER[0], "exit\r")), code=0, says=NO_ANSWER)
     yield shell("unplugged", does=UNPLUG, then=(("lost", "exit\r"),), code=0, says=("the line",))
-    moves = ("", "move 9000\r"), (ON_ITS_WAY, "")
+    moves = ("", "move 9000\r"), (ON_ITS_WAY, ""), (ASKED_MEANWHILE, "")
     # The code is that of the stop with which the shell is left.
-    lost = partial(shell, code=3, says=(*DOUBT, "THE AXIS MAY STILL BE MOVING", "emergency stop"))
+    lost = partial(shell, code=3, or_code=4, says=(*DOUBT, "(?i)the axis may (still )?be moving", "emergency stop"))
     yield lost("silent on its way", then=(*moves, FALLS_SILENT, ("in doubt", "exit\r")))
     yield lost("unplugged on its way", then=(*moves, IS_UNPLUGGED, ("in doubt", "exit\r")), leaves="moving")
     yield shell("Ctrl-C on its way", then=(*moves, ("", CTRL_C), ("stands at", "exit\r")), code=0, says=("STOP",))
     yield shell("Ctrl-X on its way", then=(*moves, ("", "\x18"), ("stands at", "exit\r")), code=0, says=("STOP",))
     jog = partial(Cell, "jog", SITTING["jog"], PATIENT + " --step 900 --name x", when="q stop and leave")
     steps = ("", "\x1b[C"), (ON_ITS_WAY, "")
-    yield jog("silent on its way", then=(*steps, FALLS_SILENT), code=8, says=DOUBT)
-    yield jog("unplugged on its way", then=(*steps, IS_UNPLUGGED), code=8, says=DOUBT, leaves="moving")
+    yield jog("silent on its way", then=(*steps, FALLS_SILENT), code=IN_DOUBT, says=DOUBT)
+    yield jog("unplugged on its way", then=(*steps, IS_UNPLUGGED), code=IN_DOUBT, says=DOUBT, leaves="moving")
     yield jog("Ctrl-C on its way", then=(*steps, ("", CTRL_C)), code=130, says=STOPPED)
 
 
@@ -404,7 +412,9 @@ def carried_out(wanted: Iterable[Cell], folder: Path) -> Iterator[dict[Cell, Fut
         "baudrate=9600",
         environment=_environment(folder),
     )
-    axes = Served("smc", *kept_lines(folder), "axes=XY", "baudrate=9600", environment=_environment(folder))
+    axes = Served(
+        "smc", *kept_lines(folder), "axes=XY", "home=-900000", "baudrate=9600", environment=_environment(folder)
+    )
     for kind, served in (("drive", drives), ("axes", axes)):
         free[kind] = SimpleQueue()
         for name in served.urls:
@@ -423,8 +433,10 @@ def carried_out(wanted: Iterable[Cell], folder: Path) -> Iterator[dict[Cell, Fut
                 "drive": pools.enter_context(ThreadPoolExecutor(DRIVES)),
                 "axes": pools.enter_context(ThreadPoolExecutor(LINES)),
             }
+            longest_first = sorted(wanted, key=lambda cell: cell.code != IN_DOUBT)
             yield {
-                cell: pool[far_end_of(cell)].submit(at_a_free_one, number, cell) for number, cell in enumerate(wanted)
+                cell: pool[far_end_of(cell)].submit(at_a_free_one, number, cell)
+                for number, cell in enumerate(longest_first)
             }
     finally:
         ended = drives.close(), axes.close()

@@ -109,8 +109,15 @@ class FarEnd:
         )
 
     def sees(self, *kinds: str) -> None:
-        """Wait until it has logged something of one of these kinds."""
-        self._served.sees(lambda each: each.get("device") == self.name and each["kind"] in kinds, self._since)
+        """Wait until it has logged something of these kinds, one after the other."""
+        waits_for = list(kinds)
+
+        def is_last(each: dict[str, Any]) -> bool:
+            if each.get("device") == self.name and each["kind"] == waits_for[0]:
+                del waits_for[0]
+            return not waits_for
+
+        self._served.sees(is_last, self._since)
 
     def seen(self, *kinds: str) -> list[str]:
         """Return the texts of what it has logged of these kinds."""

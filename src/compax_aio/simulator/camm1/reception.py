@@ -222,7 +222,7 @@ class Reception:
     def _overflow(self) -> None:
         self.lost_bytes += 1
         log = self._around.log
-        if self._around.io_error != 16 or not log or log[-1].kind is not LogKind.OVERFLOW:
+        if self._around.io_error != 16 and (not log or log[-1].kind is not LogKind.OVERFLOW):
             self._around.fail(16)
         self._around.note_count(LogKind.OVERFLOW, self.lost_bytes)
 
