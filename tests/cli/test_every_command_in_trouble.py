@@ -190,7 +190,8 @@ PATIENT = "--settings {dir}/patient.toml"
 
 INTERRUPTED = (r"Interrupted\.",)
 STOPPED = (
-    r"has acknowledged STOP and stands at -?[0-9.]+ units|Stopped: \S+; it stands|Nothing goes on that this command had set in motion",
+    r"has acknowledged STOP and stands at -?[0-9.]+ units|Stopped: \S+; it stands"
+    r"|Nothing goes on that this command had set in motion",
 )
 NO_PORT = (r"there is no serial port .*-nowhere", r"ports of this computer")
 NO_ANSWER = (r"check power|is the drive powered", r"baud")

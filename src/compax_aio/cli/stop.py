@@ -13,6 +13,7 @@ from .exit_codes import OK, exit_code_of
 from .interruption import say_at_end
 from .opening import DriveLine, Url
 from .printing import Printing, tell_error
+from .stops_under_way import let_end
 
 __all__ = ["stop"]
 
@@ -112,12 +113,7 @@ def _worst(codes: list[int]) -> int:
 
 async def _end_all(tasks: dict[str, asyncio.Task[Any]], patience_s: float) -> None:
     """Let stops that are interrupted come to their end, if they do so soon, and say of which it is known."""
-    _, unfinished = await asyncio.wait(tasks.values(), timeout=patience_s)
-    if unfinished:
-        for task in unfinished:
-            task.cancel()
-        await asyncio.wait(unfinished)
-    unknown = [url for url, task in tasks.items() if task.cancelled() or not isinstance(task.result(), StoppedDrive)]
+    unknown = await let_end(tasks, patience_s, lambda outcome: isinstance(outcome, StoppedDrive))
     if unknown:
         say_at_end(f"Interrupted. Whether these stand is not known, look at them: {', '.join(unknown)}")
     else:
