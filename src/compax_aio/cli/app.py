@@ -25,7 +25,7 @@ _MORE: Final = Group("More", sort_key=7)
 app = App(
     name="compax",
     help="""\
-Move Parker Hauser COMPAX servo drives, and AMS SMC steppers, from the terminal.
+Move Parker Hauser COMPAX servo drives and AMS SMC steppers, and cut on Roland CAMM-1 cutters, from the terminal.
 
 Every command takes the URL of a line: serial:///dev/ttyUSB0, tcp://192.168.1.50:4001, sim://compax. Begin with
 `compax ports`, then `compax probe URL`, which moves nothing.
