@@ -10,19 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from compax_aio.camm1.pacing import (
-    HANDSHAKES,
-    Doing,
-    EnqAck,
-    Handshake,
-    Hardwire,
-    Pacing,
-    Room,
-    SoftwareChecking,
-    XonXoff,
-    pacing_of,
-    reserve_of,
-)
+from compax_aio.camm1.handshakes import EnqAck, Hardwire, SoftwareChecking, XonXoff, pacing_of
+from compax_aio.camm1.pacing import HANDSHAKES, Doing, Handshake, Pacing
+from compax_aio.camm1.room import Room, reserve_of
 from compax_aio.errors import InvalidCommandError
 
 SIZES = (60, 256, 1024, 15360)

@@ -9,8 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from compax_aio.camm1.pacing import Handshake, Room, pacing_of
-from compax_aio.camm1.protocol import SIGNS, Burst, CutterProtocol, LineLevel
+from compax_aio.camm1.bursting import Burst, LineLevel
+from compax_aio.camm1.handshakes import pacing_of
+from compax_aio.camm1.pacing import Handshake
+from compax_aio.camm1.protocol import CutterProtocol
 from compax_aio.camm1.protocol_events import (
     Answered,
     BurstOver,
@@ -21,7 +23,9 @@ from compax_aio.camm1.protocol_events import (
     Unreadable,
 )
 from compax_aio.camm1.protocol_states import BUSY, DOUBTFUL, TRANSITIONS, State, Step
+from compax_aio.camm1.room import Room
 from compax_aio.camm1.settings import CutterSettings
+from compax_aio.camm1.signs import SIGNS
 from compax_aio.errors import LinkProtocolError
 from compax_aio.link.contract import Event, GoesOn, InStep, LateEnding
 

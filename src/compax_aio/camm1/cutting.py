@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Coroutine
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 from ..errors import (
-    AnswerTimeoutError,
     CompaxError,
     ConnectionLostError,
     DriveFaultError,
@@ -19,37 +18,28 @@ from ..errors import (
     MoveTimeoutError,
 )
 from ..link.cancellation import despite_cancellation
-from ..link.contract import TurnOver
 from ..motion.events import DriveEvent, MoveOutcome
-from ..severity import Severity
 from .aborting import Aborting
-from .checking import Checker, Problem, Sheet, raise_for_errors
+from .checking import Checker, Sheet
 from .cut import AnyHandshake, Cut, CutAccount, CutProgress, CutResult, CutState, OnCancel
 from .events import CutBegun, CutEnded
+from .examining import examine, examiner
 from .feed import Feed, Source
 from .finishing import Finishing
+from .handshakes import pacing_of
 from .language.instruction import Instruction
 from .language.job import tokeniser_for
 from .ledger import CutLedger
 from .line import CutterLine
-from .pacing import Handshake, Pacing, pacing_of
-from .protocol import Burst
-from .protocol_events import BurstOver
+from .pacing import Handshake, Pacing
 from .reports import CutReports, with_account
+from .sending import Sending, burst_bytes
 from .watching import MachineWatch
 from .words import handshake_words
 
 __all__ = ["Cutting", "Order"]
 
 _log = logging.getLogger("compax_aio.camm1")
-
-_BURST_S: Final = 1.0
-"""Other questions wait for no more of a job than what goes out in that time …"""
-_LEAST_BURST_BYTES: Final = 512
-_MOST_BURST_BYTES: Final = 4096
-_WATCH_S: Final = 0.5
-"""A burst under way is looked at so often."""
-_MOST_WARNINGS: Final = 20
 
 _OUTCOMES: Final[tuple[tuple[type[BaseException], MoveOutcome], ...]] = (
     (MoveStoppedError, "stopped"),
@@ -121,16 +111,12 @@ class Cutting:
             set_state=self._set_state,
             check=self._check,
         )
-        self._may_send = asyncio.Event()
-        self._may_send.set()
-        self._is_between_bursts = asyncio.Event()
-        self._is_between_bursts.set()
         self._pacing: Pacing | None = None
-        self._burst: Burst | None = None
-        self._began_at = self._watched_at = self._loop.time()
+        self._sending: Sending | None = None
+        self._wants_pause = False
+        self._began_at = self._loop.time()
         self._resets_before = line.resets_seen
         self._unread_before = 0
-        self._is_begun = False
         self._loss: ConnectionLostError | None = None
         self._why_aborted: str | None = None
         self._aborting: Aborting | None = None
@@ -167,17 +153,15 @@ class Cutting:
 
     async def pause(self) -> None:
         """Send no more; return when no instruction is half sent."""
-        if not self.is_under_way:
-            return
-        self._may_send.clear()
-        if self._burst is not None:
-            self._burst.is_given_up = True
-        await self._is_between_bursts.wait()
+        self._wants_pause = self.is_under_way
+        if self.is_under_way and self._sending is not None:
+            await self._sending.pause()
 
     def resume(self) -> None:
         """Go on sending."""
-        self._may_send.set()
-        self._watch.restart()
+        self._wants_pause = False
+        if self._sending is not None:
+            self._sending.resume()
 
     async def abort(self) -> None:
         """Stop it, and return when the machine can be used."""
@@ -196,7 +180,7 @@ class Cutting:
         is_told = self.cut.done() and not self.cut.cancelled()
         if self._order.on_cancel == "abort":
             self.request_abort("aborted, for its cutter was closed")
-        self._may_send.set()
+        self.resume()
         await asyncio.wait([self.task])
         if self._stop_error is not None and not is_told:
             raise self._stop_error
@@ -205,27 +189,34 @@ class Cutting:
         """Take note that the line was lost: what is in the machine may be cut, and the rest is not sent."""
         if self._is_begun and self.is_under_way and self._loss is None:
             self._loss = error
-            self._watch.wake.set()
-            self._may_send.set()
+            self._wake()
 
     def note_reset(self) -> None:
         """Take note that the machine was seen to have been reset."""
+        self._wake()
+
+    def _wake(self) -> None:
+        """Have whoever waits find out that the job shall not go on."""
         self._watch.wake.set()
-        self._may_send.set()
+        self.resume()
+
+    @property
+    def _is_begun(self) -> bool:
+        """Whether something of the job may be in the machine."""
+        return self._sending is not None and self._sending.is_begun
 
     def request_abort(self, why: str) -> None:
         """Stop it: ``.K`` is written before this returns, if anything of the job may be in the machine."""
         if not self.is_under_way or self._why_aborted is not None:
             return
         self._why_aborted = why
-        if self._burst is not None:
-            self._burst.is_given_up = True
+        if self._sending is not None:
+            self._sending.give_up_burst()
         if self._is_begun:
             self._set_state("aborting")
             self._aborting = Aborting(self._line)
             self._line.protocol.pacing = None
-        self._may_send.set()
-        self._watch.wake.set()
+        self._wake()
 
     # The job --------------------------------------------------------------------------------------------------------
 
@@ -247,12 +238,11 @@ class Cutting:
             await self._after
         self._check()
         self._began_at = self._loop.time()
-        await self._begin()
-        assert self._pacing is not None
-        await self._send_all()
+        pacing, sending = await self._begin()
+        await self._send_all(sending)
         self._set_state("finishing")
         ledger = self._ledger
-        await self._send(self._tail())
+        await sending.send(self._tail(), is_tail=True)
         finishing = Finishing(self._line, self._watch, self._reports, is_mode_1=ledger.ends_in_mode_1)
         proof = await finishing.prove(self.account())
         if self._line.unread_errors != self._unread_before:
@@ -263,14 +253,14 @@ class Cutting:
             cutter=self._line.name,
             bytes=ledger.job_bytes,
             instructions=ledger.instructions_sent,
-            handshake=self._pacing.handshake,
+            handshake=pacing.handshake,
             handshake_because=self._because,
             proved_by=proof,
             duration_s=self._loop.time() - self._began_at,
             warnings=tuple(self._watch.warnings),
         )
 
-    async def _begin(self) -> None:
+    async def _begin(self) -> tuple[Pacing, Sending]:
         """Look whether the machine is free, check the job, and establish the handshake."""
         status = await self._watch.until_not_held()
         if not status.buffer_is_empty and not (await self._watch.status()).buffer_is_empty:  # one look may be damaged
@@ -278,7 +268,7 @@ class Cutting:
         capacity = await self._watch.free_space()
         self._watch.capacity_bytes = capacity
         handshake, self._because = self._choose()
-        self._pacing = pacing = pacing_of(handshake, self._line.room_of(capacity))
+        self._pacing = pacing = pacing_of(handshake, self._line.room_of(capacity), self._line.free_space_query)
         profile = self._line.profile
         words = handshake_words(pacing, profile)
         await self._examine(capacity)
@@ -288,7 +278,11 @@ class Cutting:
         await self._watch.ask(lambda: self._line.tell(words, what=f"the handshake {handshake!r}"))
         self._line.protocol.pacing = pacing
         self._unread_before = self._line.unread_errors
+        self._sending = sending = Sending(self._order.description, self._line, pacing, self._watch, self._ledger)
+        if self._wants_pause:
+            await sending.pause()
         self._publish(CutBegun(self._line.name, self._loop.time(), self._order.description, handshake))
+        return pacing, sending
 
     def _choose(self) -> tuple[Handshake, str]:
         if self._order.handshake != "auto":
@@ -299,70 +293,36 @@ class Cutting:
         for code in codes:
             self._watch.warnings.append(f"error {code} of the line was told before the job began, and is cleared")
 
-    async def _examine(self, capacity: int) -> None:
-        """
-        Look through a job that is at hand as a whole, before anything of it is sent.
+    def _checker(self, capacity_bytes: int) -> Checker | None:
+        if not self._order.check:
+            return None
+        return Checker(self._line.profile, self._order.sheet, buffer_bytes=capacity_bytes)
 
-        Raises:
-            InvalidCommandError: It has errors, or an instruction that gets through no buffer of that size.
-        """
-        if not self._order.source.is_whole:
-            return
-        problems: list[Problem] = []
-        checker = Checker(self._line.profile, self._order.sheet, buffer_bytes=capacity) if self._order.check else None
+    async def _examine(self, capacity_bytes: int) -> None:
+        source = self._order.source
+        if source.is_whole:
+            examined = await examine(self._feed, self._checker(capacity_bytes), self._check)
+            self._watch.warnings += examined.warnings
+            self._ledger.total_bytes = source.total_bytes
+            self._ledger.total_instructions = examined.instructions
 
-        def examine(instruction: Instruction) -> None:
-            if checker is not None:
-                problems.extend(checker.take(instruction))
+    def _feed(self, look: Callable[[Instruction], None]) -> Feed:
+        assert self._pacing is not None
+        return Feed(self._order.source, self._line.profile, self._pacing.longest_bytes, self._pacing.most_bytes, look)
 
-        feed = self._feed_of(examine)
-        count = 0
-        try:
-            while taken := await feed.take(_MOST_BURST_BYTES):
-                count += len(taken)
-                await asyncio.sleep(0)  # a long job takes its time: others have theirs
-                self._check()
-        finally:
-            await feed.close()
-        if checker is not None:
-            problems += checker.finish()
-        raise_for_errors(problems)
-        warned = [str(each) for each in problems if each.severity is Severity.WARNING]
-        self._watch.warnings += warned[:_MOST_WARNINGS]
-        self._ledger.total_bytes = self._order.source.total_bytes
-        self._ledger.total_instructions = count
-
-    def _feed_of(self, examine: Callable[[Instruction], None]) -> Feed:
-        pacing = self._pacing
-        assert pacing is not None
-        return Feed(self._order.source, self._line.profile, pacing.longest_bytes, pacing.most_bytes, examine)
-
-    def _examine_on_its_way(self) -> Callable[[Instruction], None]:
-        """Return what looks at the instructions of a job that comes piece by piece."""
-        if self._order.source.is_whole or not self._order.check:
-            return lambda _: None
-        checker = Checker(self._line.profile, self._order.sheet, buffer_bytes=self._watch.capacity_bytes)
-        return lambda instruction: raise_for_errors(checker.take(instruction))
-
-    # Sending --------------------------------------------------------------------------------------------------------
-
-    @property
-    def _burst_bytes(self) -> int:
-        rate = self._line.link.bytes_per_s or _LEAST_BURST_BYTES
-        return max(_LEAST_BURST_BYTES, min(int(rate * _BURST_S), _MOST_BURST_BYTES))
-
-    async def _send_all(self) -> None:
-        feed = self._feed_of(self._examine_on_its_way())
-        size = self._burst_bytes
+    async def _send_all(self, sending: Sending) -> None:
+        is_examined = self._order.source.is_whole
+        feed = self._feed(examiner(None if is_examined else self._checker(self._watch.capacity_bytes)))
+        size = burst_bytes(self._line.link.bytes_per_s)
         self._watch.restart()
-        self._watched_at = self._loop.time()
+        looked_at = self._loop.time()
         try:
             while taken := await self._unless_aborted(feed.take(size)):
-                await self._send(taken)
-                if self._loop.time() - self._watched_at >= self._line.settings.watch_s:
-                    self._watched_at = self._loop.time()
-                    await self._watch.look_for_errors()
-                    self._note_free(await self._watch.free_space())
+                await sending.send(taken)
+                self.cut.note_change()
+                if self._loop.time() - looked_at >= self._line.settings.watch_s:
+                    looked_at = self._loop.time()
+                    await sending.look_around()
         finally:
             await feed.close()
         self._ledger.note_all_sent()
@@ -371,9 +331,9 @@ class Cutting:
                 f"left out: {feed.left_out} instructions with device control, or that have the cutter answer"
             )
 
-    async def _unless_aborted(self, taking: Awaitable[list[Instruction]]) -> list[Instruction]:
+    async def _unless_aborted(self, taking: Coroutine[Any, Any, list[Instruction]]) -> list[Instruction]:
         """Wait for more of the job, but not when it shall not go on."""
-        task = asyncio.ensure_future(taking)
+        task = self._loop.create_task(taking)
         try:
             while not task.done():
                 self._watch.wake.clear()
@@ -392,88 +352,6 @@ class Cutting:
         """Return what lifts the tool behind the job, whatever stands at its end."""
         text = b";^PU;" if self._ledger.ends_in_mode_1 else b";PU;"
         return tokeniser_for(self._line.profile).feed(text)
-
-    async def _send(self, instructions: list[Instruction]) -> None:
-        """Write instructions as there is room, until all are written."""
-        is_job = self._state != "finishing"
-        while instructions:
-            await self._until_not_paused()
-            if is_job:
-                self._set_state("cutting")
-            written, is_full = await self._send_burst(instructions, is_job=is_job)
-            instructions = instructions[written:]
-            self._note_progress()
-            self._check()
-            if is_full is None:
-                await self._watch.status()  # the line gets in step, or what has become of it is told
-            elif is_full:
-                self._set_state("buffer full" if is_job else "finishing")
-                await self._watch.wait_for_room()
-            elif is_job:
-                assert self._pacing is not None
-                await self._watch.look(self._pacing.free_bytes if self._pacing.tells_free_space else None)
-
-    async def _send_burst(self, instructions: list[Instruction], *, is_job: bool) -> tuple[int, bool | None]:
-        """Write one burst; return how many instructions were written, and whether the buffer is full; None: unknown."""
-        first, last = instructions[0], instructions[-1]
-        which = f"bytes {first.offset}-{last.offset + len(last.data) - 1}" if is_job else "end"
-        label = f"{which} of {self._order.description}"
-        self._burst = burst = Burst(label, [each.data for each in instructions])
-        self._is_begun = True
-        loss: ConnectionLostError | None = None
-        self._is_between_bursts.clear()
-        try:
-            outcome = await self._watched(burst)
-        except AnswerTimeoutError:
-            return burst.written, None
-        except ConnectionLostError as error:
-            loss = error
-        finally:
-            if is_job:
-                self._ledger.note_sent(instructions[: burst.written])
-            self._burst = None
-            self._is_between_bursts.set()
-        if loss is not None:
-            self._check()
-            raise self._reports.lost(loss, self.account()) from loss
-        return burst.written, outcome.is_full if isinstance(outcome, BurstOver) else None
-
-    async def _watched(self, burst: Burst) -> TurnOver:
-        """Await the end of a burst; one that cannot leave, because the cable holds the line, is told."""
-        sending = asyncio.ensure_future(self._line.send_burst(burst))
-        held_since = self._loop.time()
-        seen = (0, 0)
-        while not sending.done():
-            await asyncio.wait([sending], timeout=_WATCH_S)
-            now = (burst.written, self._line.link.unsent_bytes)
-            if now != seen or self._why_aborted is not None:
-                seen, held_since = now, self._loop.time()
-            elif now[1] and not sending.done():
-                self._set_state("line held")
-                if self._loop.time() - held_since >= self._line.settings.held_timeout_s:
-                    burst.is_given_up = True
-                    await asyncio.wait([sending], timeout=_WATCH_S)
-                    seconds = self._loop.time() - held_since
-                    raise self._reports.stalled(seconds, self.account(), is_held=True)
-        return sending.result()
-
-    async def _until_not_paused(self) -> None:
-        while not self._may_send.is_set():
-            self._set_state("paused")
-            await self._may_send.wait()
-            self._check()
-        self._check()
-
-    def _note_free(self, free_bytes: int) -> None:
-        if self._pacing is not None:
-            self._pacing.told(free_bytes)
-            self._note_progress()
-
-    def _note_progress(self) -> None:
-        pacing = self._pacing
-        assert pacing is not None
-        self._watch.note((pacing.written_bytes, pacing.taken_bytes))
-        self.cut.note_change()
 
     def _set_state(self, state: CutState) -> None:
         if self._state not in {state, "aborting"}:

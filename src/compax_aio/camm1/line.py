@@ -14,14 +14,15 @@ from ..link.reconnecting import Reconnecting, Restored
 from ..link.taps import plain
 from ..transports.line_settings import LineSettings
 from ..transports.url import TransportURL
+from .bursting import Burst, LineLevel
 from .facts.line import BITS_PER_CHARACTER_8N1, bits_per_character
 from .facts.reports import IO_ERRORS, NO_ERROR
 from .instructions import AbortCutting, AskError, AskFreeSpace, AskModel, AskStatus, encode
-from .pacing import Room
 from .profiles import Profile
-from .protocol import Burst, CutterProtocol, LineLevel
+from .protocol import CutterProtocol
 from .protocol_events import Answered, BurstOver, CutShort, SettingsLost, StatusSeen, Unreadable
 from .replies import CutterStatus, decode_bytes, decode_error, decode_status
+from .room import Room
 from .settings import CutterSettings
 
 __all__ = ["CutterLine", "meaning_of"]
@@ -110,6 +111,11 @@ class CutterLine:
             return None  # whoever opens it says what is wrong
         bits = bits_per_character(line.bytesize, line.parity != "N", line.stopbits)
         return line.baudrate / bits
+
+    @property
+    def free_space_query(self) -> bytes:
+        """What asks for free space, as this machine has it."""
+        return self._free_text.encode()
 
     def room_of(self, capacity_bytes: int) -> Room:
         """Say what a job has to get through, with a buffer of that size."""

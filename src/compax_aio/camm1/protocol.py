@@ -16,22 +16,20 @@ does not come of it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Final
 
 from ..errors import LinkProtocolError
 from ..link.contract import Event, GoesOn, Hold, InStep, LateEnding, Stranger
+from .bursting import Burst, BurstWriter, LineLevel
 from .facts.line import CARRIAGE_RETURN, ESCAPE, LINE_FEED
-from .pacing import FLOW_SIGNS, HEARD, Doing, Pacing
+from .handshakes import HEARD
+from .pacing import FLOW_SIGNS, Doing, Pacing
 from .protocol_events import Answered, BurstOver, CutShort, SettingsLost, StatusSeen, Stray, Unreadable
 from .protocol_states import BUSY, DOUBTFUL, TRANSITIONS, State, Step
 from .settings import CutterSettings
+from .signs import Signs
 
-__all__ = ["AGREED_FORMAT", "SIGNS", "Burst", "CutterProtocol", "LineLevel"]
-
-SIGNS: Final = "#$%&*=@~"
-"""None of them stands in a reply, in an acknowledgement, or in a number of a parameter list."""
+__all__ = ["AGREED_FORMAT", "CutterProtocol"]
 
 _ESC: Final = chr(ESCAPE)
 ABORT_OUTPUT: Final = f"{_ESC}.J"
@@ -43,60 +41,10 @@ AGREED_FORMAT: Final = f"{_ESC}.M:"
 _MOST_OF_A_REPLY: Final = 80
 _MOST_OF_A_STRAY: Final = 64
 _MOST_DIGITS: Final = 5
-_SHORTEST_PAUSE_S: Final = 0.001
-_PAUSE_ON_HELD_LINE_S: Final = 0.01
 _PLAIN_ATTEMPTS: Final = 2
 """So many markers on a new line are as usual; from then on what a cutter may wait for is sent in front."""
 _WAITED_FOR: Final = "\x11\r\n"
 """A trigger and echo terminators by custom (HP7470 p. 10-15; presets 1 and 2, DXY-1150A p. 36); no cutting data."""
-
-
-@dataclass(slots=True, eq=False)
-class Burst:
-    """
-    Instructions of a job that are to be written next.
-
-    Attributes:
-        label: What it is called in errors and on records.
-        instructions: Each whole.
-        written: How many of them were.
-        written_bytes: Of these.
-        is_given_up: Set it to have no more of it written.
-    """
-
-    label: str
-    instructions: Sequence[bytes]
-    written: int = 0
-    written_bytes: int = 0
-    is_given_up: bool = False
-
-    @property
-    def next_bytes(self) -> int | None:
-        """How long the next instruction is; None if nothing more shall be written."""
-        if self.is_given_up or self.written == len(self.instructions):
-            return None
-        return len(self.instructions[self.written])
-
-    def take(self) -> bytes:
-        """Take the next instruction, to write it."""
-        data = self.instructions[self.written]
-        self.written += 1
-        self.written_bytes += len(data)
-        return data
-
-
-@dataclass(slots=True)
-class LineLevel:
-    """
-    What is known of the line that bytes go out on.
-
-    Attributes:
-        bytes_per_s: How fast it sends; None: nobody knows.
-        unsent: Says how many bytes that were written have not left yet.
-    """
-
-    bytes_per_s: float | None = None
-    unsent: Callable[[], int] = lambda: 0
 
 
 class CutterProtocol:
@@ -107,7 +55,6 @@ class CutterProtocol:
         settings: How long things take.
         status_query: What asks for the status (``ESC.O``).
         free_space_query: What asks for free space (``ESC.B``).
-        has_signs: Whether the cutter is thought to put a sign in front of replies; if it does not, that is found out.
 
     Attributes:
         pacing: How the job goes through the buffer, while there is one.
@@ -120,7 +67,6 @@ class CutterProtocol:
         *,
         status_query: str = f"{_ESC}.O",
         free_space_query: str = f"{_ESC}.B",
-        has_signs: bool = True,
     ) -> None:
         self.state = State.IN_DOUBT
         self.pacing: Pacing | None = None
@@ -128,27 +74,18 @@ class CutterProtocol:
         self._settings = settings
         self._status_query = status_query
         self._free_space_query = free_space_query
-        self._has_signs = has_signs
-        self._has_signed = False
-        self._sign = SIGNS[-1]
-        """That was said last; until a reply bears it, the cutter may not have heard of it …"""
-        self._signs_said = ""
-        """… and know none but one of these."""
+        self._signs = Signs(settings.turnaround_ms)
         self._is_agreed = False
         """Whether the cutter has been told how replies shall look, and has shown that it knows."""
         self._markers = 0
         """Sent on this line until it was in step."""
-        self._is_plain = False
-        """Whether a reply without a sign came where one with a sign was awaited."""
         self._sent = ""
         self._given_up = ""
         """What was asked last and not answered."""
         self._owes = False
         """Whether an output instruction may stand in the cutter's buffer that was given up."""
-        self._burst: Burst | None = None
+        self._writer: BurstWriter | None = None
         self._loaded: Burst | None = None
-        self._pause_s: float | None = None
-        self._waited_s = 0.0
         self._held_s = 0.0
         """For how long what was written last could not leave."""
         self._line = bytearray()
@@ -173,8 +110,8 @@ class CutterProtocol:
     def patience_s(self) -> float | None:
         """How long what is awaited may take; the bytes that must leave first have their time."""
         if self.state in {State.BURSTING, State.QUESTIONING, State.ENDING}:
-            return self._pause_s
-        leaves_s = self._leaves_s()
+            return self._paces().pause_s
+        leaves_s = self.level.leaves_s(self._unwritten_bytes)
         if self.state is State.SETTLING:
             return leaves_s + self._settings.settle_s
         if self.state is State.DRAINING:
@@ -202,7 +139,7 @@ class CutterProtocol:
     @property
     def has_signs(self) -> bool:
         """Whether replies bear a sign; if not, late ones are told by their time alone, and power cycles go unseen."""
-        return self._has_signs
+        return self._signs.are_used
 
     # What the link does ---------------------------------------------------------------------------------------------
 
@@ -217,9 +154,9 @@ class CutterProtocol:
         self._begin_anew()
 
     def _begin_anew(self) -> None:
-        self._is_agreed = self._owes = self._is_plain = False
+        self._is_agreed = self._owes = False
         self._markers = 0
-        self._burst = None
+        self._writer = None
         self._given_up = ""
         self._forget_received()
         self._to_send.clear()
@@ -233,19 +170,21 @@ class CutterProtocol:
         self._forget_received()
         self._sent = text
         if self._loaded is not None and text == self._loaded.label:
-            self._burst, self._loaded = self._loaded, None
+            burst, self._loaded = self._loaded, None
+            if self.pacing is None:
+                raise LinkProtocolError("a burst has no handshake")
             self._step(Step.BURST_BEGUN)
-            self._paces().begin()
+            self._writer = BurstWriter(burst, self.pacing, self.level, self._settings)
             self._go_on(is_begin=True)
         else:
             self._step(Step.QUERY_SENT)
-            self._write(text.replace(AGREED_FORMAT, self._format()))
+            self._write(text.replace(AGREED_FORMAT, self._signs.form()))
 
     def send_marker(self) -> None:
         """Abort output, and ask in the old form; on a new line, agree on a form at once."""
         self._forget_received()
         self._markers += 1
-        if self._is_agreed or not self._has_signs:
+        if self._is_agreed or not self._signs.are_used:
             self._clear()
         else:
             in_front = _WAITED_FOR if self._markers > _PLAIN_ATTEMPTS else ""
@@ -284,14 +223,14 @@ class CutterProtocol:
         elif self.state is State.QUESTIONING:
             self._end_pause_in_question()
         else:
-            if self.state is State.SIGNING and self._is_plain and not self._has_signed:
-                self._has_signs = False  # it answers, and never with a sign
+            if self.state is State.SIGNING:
+                self._signs.give_up()
             self._step(Step.TIME_RAN_OUT)
             self._give_up()
 
     def _is_held_back(self) -> bool:
         """Whether what was written could not leave, so that nobody can have answered it; not for ever."""
-        if self.state in {State.BURSTING, State.ENDING} or not self._unsent():
+        if self.state in {State.BURSTING, State.ENDING} or not self.level.waiting(self._unwritten_bytes):
             return False
         self._held_s += self.patience_s or 0.0
         return self._held_s < self._settings.held_timeout_s
@@ -310,7 +249,7 @@ class CutterProtocol:
         for byte in data:
             if byte in FLOW_SIGNS:
                 self._read_flow(byte)
-            elif self.state is State.QUESTIONING and self._paces().acknowledgement:
+            elif self.state is State.QUESTIONING and self._paces().pacing.acknowledgement:
                 self._read_signal(byte)
             elif byte == CARRIAGE_RETURN:
                 self._read_line()
@@ -348,21 +287,26 @@ class CutterProtocol:
         text, was_too_long, self._is_too_long = self._take_line(), self._is_too_long, False
         if self.pacing is not None and self.pacing.acknowledgement:
             text = text.lstrip((self.pacing.acknowledgement + HEARD).decode())  # one that came late
+        sign, rest = self._signs.parted(text)
         if was_too_long:
             self._stray(text)
-        elif self._has_signs and text and text[0] in SIGNS:
-            self._read_signed(text[0], text[1:])
-        elif text or (not self._has_signs and self.state is State.ASKING):  # .E of some is empty
+        elif sign:
+            self._read_signed(sign, rest)
+        elif text or (not self._signs.are_used and self.state is State.ASKING):  # .E of some is empty
             self._read_plain(text)
 
     def _read_signed(self, sign: str, text: str) -> None:
-        if self.state is State.PROBING and sign in self._signs_said:
+        if self.state is State.PROBING and self._signs.may_be_known(sign):
             self._events.append(StatusSeen(text))
             self._agree()
-        elif sign != self._sign:
+        elif self._signs.is_last(sign):
+            self._read_known(text)
+        else:
             self._note_late(text)
-        elif self.state is State.SIGNING:
-            self._has_signed = True
+
+    def _read_known(self, text: str) -> None:
+        """Read a reply in the form that was agreed on."""
+        if self.state is State.SIGNING:
             self._get_in_step(text)
         elif self.state is State.DRAINING:
             self._note_late(text)
@@ -370,18 +314,13 @@ class CutterProtocol:
             self._read_answer(text)
 
     def _read_plain(self, text: str) -> None:
-        if not self._has_signs:
-            if self.state is State.SIGNING:
-                self._get_in_step(text)
-            elif self.state is State.DRAINING:
-                self._note_late(text)
-            else:
-                self._read_answer(text)
+        if not self._signs.are_used:
+            self._read_known(text)
         elif self.state is State.PROBING and _is_number(text):
             self._events.append(SettingsLost(text))
             self._agree()
-        elif self.state is State.SIGNING:
-            self._is_plain = self._is_plain or _is_number(text)
+        elif self.state is State.SIGNING and _is_number(text):
+            self._signs.note_plain()
         elif self.state in {State.ASKING, State.QUESTIONING, State.WITHDRAWING}:
             self._fail(text)  # damaged; or the cutter was switched off and on, which the marker finds out
         else:
@@ -397,7 +336,7 @@ class CutterProtocol:
             self._stray(text)
 
     def _read_free_space(self, text: str) -> None:
-        if not _is_number(text) or not self._paces().answered(int(text)):
+        if not _is_number(text) or not self._paces().pacing.answered(int(text)):
             self._fail(text)
         elif self.state is State.WITHDRAWING:
             self._end_burst(is_full=True)
@@ -431,18 +370,17 @@ class CutterProtocol:
 
     def _read_signal(self, byte: int) -> None:
         """Read the acknowledgement, or the immediate response, of ENQ."""
-        pacing = self._paces()
+        writer = self._paces()
         if byte in {CARRIAGE_RETURN, LINE_FEED}:
             return
         self._signals.append(byte)
         if self._signals.endswith(HEARD):
             self._signals.clear()
-            pacing.heard()
-            self._waited_s = 0.0
+            writer.heard()
             self._go_on()
-        elif self._signals.endswith(pacing.acknowledgement):
+        elif self._signals.endswith(writer.pacing.acknowledgement):
             self._signals.clear()
-            pacing.acknowledged()
+            writer.pacing.acknowledged()
             self._step(Step.QUESTION_ANSWERED)
             self._go_on()
         elif len(self._signals) > _MOST_OF_A_STRAY:
@@ -451,82 +389,36 @@ class CutterProtocol:
 
     # Bursts ---------------------------------------------------------------------------------------------------------
 
-    def _paces(self) -> Pacing:
-        if self.pacing is None:
-            raise LinkProtocolError("a burst has no handshake")
-        return self.pacing
+    def _paces(self) -> BurstWriter:
+        assert self._writer is not None  # there is one in every state that has a burst
+        return self._writer
 
     def _go_on(self, *, is_begin: bool = False) -> None:
-        """Write what may be written, and say what is waited for then."""
-        burst, pacing = self._burst, self._paces()
-        assert burst is not None
-        unsent = self._unsent()
-        while True:
-            doing = pacing.next(burst.next_bytes, unsent)
-            if doing is Doing.WRITE:
-                data = burst.take()
-            elif doing is Doing.ASK:
-                data = pacing.question
-                pacing.asked()
-                self._waited_s = self._held_s = 0.0
-                self._step(Step.QUESTION_SENT)
-            else:
-                break
-            if doing is Doing.WRITE:
-                pacing.wrote(len(data))
-            self._to_send.append(data)
-            unsent = None if unsent is None else unsent + len(data)
-        self._wait(doing, unsent, is_begin=is_begin)
-
-    def _wait(self, doing: Doing, unsent: int | None, *, is_begin: bool) -> None:
-        if doing in {Doing.FULL, Doing.DONE}:
-            if is_begin:  # the link is told of it when it listens
-                self._step(Step.WRITTEN)
-                self._pause_s = 0.0
-            else:
-                self._end_burst(is_full=doing is Doing.FULL)
-            return
-        if doing is Doing.PAUSE:
-            self._pause_s = self._pause_until_low(unsent or 0)
-        elif doing is Doing.HELD:
-            self._pause_s = self._settings.look_s
+        """Write what may be written; the link is told of an end when it listens."""
+        doing, has_asked = self._paces().go_on(self._unwritten_bytes, self._to_send.append)
+        if has_asked:
+            self._held_s = 0.0
+            self._step(Step.QUESTION_SENT)
+        if doing not in {Doing.FULL, Doing.DONE}:
+            self._events.append(GoesOn())
+        elif is_begin:
+            self._step(Step.WRITTEN)
         else:
-            self._pause_s = max(self._allowed_s() - self._waited_s, _SHORTEST_PAUSE_S)
-        self._events.append(GoesOn())
-
-    def _pause_until_low(self, unsent: int) -> float:
-        burst, pacing = self._burst, self._paces()
-        assert burst is not None
-        size = burst.next_bytes or 0
-        target = max(0, min(pacing.low_unsent_bytes, (pacing.most_unsent_bytes or 0) - size))
-        if self.level.bytes_per_s is None:
-            return _PAUSE_ON_HELD_LINE_S
-        return max((unsent - target) / self.level.bytes_per_s, _SHORTEST_PAUSE_S)
-
-    def _allowed_s(self) -> float:
-        """How long the answer to the handshake's question may take."""
-        settings = self._settings
-        patience_s = settings.enquiry_timeout_s if self._paces().acknowledgement else settings.answered_after_s
-        if self._may_be_held:
-            patience_s = settings.held_timeout_s
-        return patience_s + self._leaves_s()
+            self._end_burst(is_full=doing is Doing.FULL)
 
     def _end_pause(self) -> None:
+        writer = self._paces()
         if self.state is State.ENDING:
-            burst = self._burst
-            assert burst is not None
-            self._end_burst(is_full=burst.next_bytes is not None)
-            return
-        pacing = self._paces()
-        if pacing.is_held:
-            pacing.look()
-        self._go_on()
+            self._end_burst(is_full=writer.burst.next_bytes is not None)
+        else:
+            writer.end_pause()
+            self._go_on()
 
     def _end_pause_in_question(self) -> None:
-        self._waited_s += self._pause_s or 0.0
-        if self._waited_s < self._allowed_s() - _SHORTEST_PAUSE_S / 2:
+        writer = self._paces()
+        if writer.end_pause_in_question():
             self._go_on()
-        elif self._paces().acknowledgement:
+        elif writer.pacing.acknowledgement:
             self._step(Step.WITHDRAWN)
             self._forget_received()
             self._write(ABORT_OUTPUT + self._free_space_query)
@@ -536,7 +428,7 @@ class CutterProtocol:
 
     def _end_burst(self, *, is_full: bool) -> None:
         self._step(Step.BURST_OVER)
-        self._burst = None
+        self._writer = None
         self._events.append(BurstOver(is_full))
 
     # Getting in step ------------------------------------------------------------------------------------------------
@@ -546,12 +438,12 @@ class CutterProtocol:
         self._owes = self._owes or (_waits_for_cutting(self._sent) and self._sent.endswith(";"))
         self._given_up = self._sent or self._given_up
         self._sent = ""
-        self._burst = None
+        self._writer = None
         self._forget_received()
 
     def _end_draining(self) -> None:
         self._forget_received()
-        if self._has_signs and self._is_agreed:
+        if self._signs.are_used and self._is_agreed:
             self._step(Step.DRAINED)
             self._write(self._status_query)
         else:
@@ -560,22 +452,14 @@ class CutterProtocol:
     def _agree(self) -> None:
         """Tell the cutter the form of replies, and ask for one."""
         self._step(Step.SIGN_SENT)
-        self._is_plain = False
-        if self._has_signs:
-            self._sign = SIGNS[(SIGNS.index(self._sign) + 1) % len(SIGNS)]
-            self._signs_said += self._sign
-        self._write(self._format() + self._status_query)
+        self._signs.change()
+        self._write(self._signs.form() + self._status_query)
         self._events.append(GoesOn())
-
-    def _format(self) -> str:
-        """Say the form of replies: a turnaround, no trigger, no echo, CR at the end and the sign in front."""
-        sign = ord(self._sign) if self._has_signs else 0
-        return f"{_ESC}.M{self._settings.turnaround_ms};0;0;{CARRIAGE_RETURN};0;{sign}:"
 
     def _get_in_step(self, status: str) -> None:
         self._step(Step.SIGNED)
         self._events.append(StatusSeen(status))
-        self._signs_said = self._sign
+        self._signs.confirm()
         self._is_agreed = True
         self._owes = False
         self._given_up = ""
@@ -588,14 +472,9 @@ class CutterProtocol:
         self._held_s = 0.0
         self._to_send.append(text.encode("latin-1"))
 
-    def _unsent(self) -> int | None:
-        if self.level.bytes_per_s is None:
-            return None
-        return self.level.unsent() + sum(map(len, self._to_send))
-
-    def _leaves_s(self) -> float:
-        """How long it takes until all has left that was written."""
-        return (self._unsent() or 0) / self.level.bytes_per_s if self.level.bytes_per_s else 0.0
+    @property
+    def _unwritten_bytes(self) -> int:
+        return sum(map(len, self._to_send))
 
     def _step(self, step: Step) -> None:
         try:

@@ -42,6 +42,7 @@ class MachineWatch:
         check: Raises if the job shall not go on.
 
     Attributes:
+        reports, account, set_state, check: As above.
         capacity_bytes: Of the buffer.
         wake: Set it to have whoever waits look whether the job shall go on.
         warnings: What was told that ruins nothing.
@@ -62,11 +63,11 @@ class MachineWatch:
         self.warnings: list[str] = []
         self._line = line
         self._settings = line.settings
-        self._reports = reports
-        self._account = account
+        self.reports = reports
+        self.account = account
         self._publish = publish
-        self._set_state = set_state
-        self._check = check
+        self.set_state = set_state
+        self.check = check
         self._loop = asyncio.get_running_loop()
         self._seen: object = None
         self._was_held = False
@@ -78,13 +79,13 @@ class MachineWatch:
     async def pause(self, seconds: float) -> None:
         """Wait, but not when the job shall not go on."""
         self.wake.clear()
-        self._check()
+        self.check()
         try:
             async with asyncio.timeout(seconds):
                 await self.wake.wait()
         except TimeoutError:
             pass
-        self._check()
+        self.check()
 
     def note(self, seen: object) -> None:
         """Take note of what changes as long as the cutter takes data."""
@@ -117,14 +118,14 @@ class MachineWatch:
             try:
                 answer = await question()
             except (AnswerTimeoutError, UnexpectedAnswerError) as error:
-                self._check()
+                self.check()
                 if self._loop.time() >= give_up_at:
-                    raise self._reports.lost(error, self._account()) from error
+                    raise self.reports.lost(error, self.account()) from error
             except ConnectionLostError as error:
-                self._check()
-                raise self._reports.lost(error, self._account()) from error
+                self.check()
+                raise self.reports.lost(error, self.account()) from error
             else:
-                self._check()
+                self.check()
                 self._changed_at += self._loop.time() - asked_at  # meanwhile nobody could see whether anything changes
                 return answer
             await self.pause(_AGAIN_S)
@@ -170,7 +171,7 @@ class MachineWatch:
         if _is_held(status):
             await self._until_resumed(status)
         elif self.flat_s >= self._settings.stall_timeout_s:
-            raise self._reports.stalled(self.flat_s, self._account(), is_held=False)
+            raise self.reports.stalled(self.flat_s, self.account(), is_held=False)
 
     async def until_empty(self) -> None:
         """
@@ -190,7 +191,7 @@ class MachineWatch:
                 return
             self.note(await self.free_space())
             if self.flat_s >= self._settings.stall_timeout_s:
-                raise self._reports.stalled(self.flat_s, self._account(), is_held=False)
+                raise self.reports.stalled(self.flat_s, self.account(), is_held=False)
             await self.pause(self._poll_s)
             self._poll_s = min(2 * self._poll_s, self._settings.poll_slowest_s)
 
@@ -211,7 +212,7 @@ class MachineWatch:
         self._looked_at = self._loop.time()
         was_held, self._was_held = self._was_held, False
         if was_held and not _is_held(status):
-            raise self._reports.perhaps_cancelled(self._account())
+            raise self.reports.perhaps_cancelled(self.account())
         return status
 
     def note_status(self, status: CutterStatus) -> None:
@@ -225,7 +226,7 @@ class MachineWatch:
         A paused machine takes nothing. If it has become empty all the same, its data was deleted: so PAUSE and SETUP
         end a job (PNC-900 p. 10). If it is empty the moment it goes on, that may be, too.
         """
-        self._set_state("operator pause")
+        self.set_state("operator pause")
         self._publish(CutterPaused(self._line.name, self._loop.time()))
         was_empty = status.buffer_is_empty
         while _is_held(status):
@@ -233,8 +234,8 @@ class MachineWatch:
             status = await self.status()
             if status.buffer_is_empty and not was_empty:
                 if _is_held(status):
-                    raise self._reports.cancelled_at_machine(self._account())
-                raise self._reports.perhaps_cancelled(self._account())
+                    raise self.reports.cancelled_at_machine(self.account())
+                raise self.reports.perhaps_cancelled(self.account())
             was_empty = status.buffer_is_empty
         self._was_held = False
         self._publish(CutterResumed(self._line.name, self._loop.time()))
@@ -253,7 +254,7 @@ class MachineWatch:
             error = IO_ERRORS.get(code)
             self._publish(CutterError(self._line.name, self._loop.time(), code, meaning_of(code), "ESC.E"))
             if error is None or error.ruins_job:
-                raise self._reports.faulty(code, self._account())
+                raise self.reports.faulty(code, self.account())
             self.warnings.append(f"the cutter has told {meaning_of(code)}")
 
 

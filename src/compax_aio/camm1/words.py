@@ -7,8 +7,9 @@ from typing import Final
 
 from ..errors import InvalidCommandError
 from .facts.line import DC1, DC3, ENQ
+from .handshakes import ACKNOWLEDGEMENT, HEARD, EnqAck, Hardwire, XonXoff
 from .instructions import BlockHandshake, Control, DtrControl, EnqAckMode1, PresetHandshake, Reset, SignFormat, encode
-from .pacing import ACKNOWLEDGEMENT, HEARD, EnqAck, Hardwire, Pacing, XonXoff
+from .pacing import Pacing
 from .profiles import Profile
 from .protocol import AGREED_FORMAT
 
