@@ -44,8 +44,11 @@ class Signs:
         return encode(controls, explicit=True).decode()
 
     def parted(self, text: str) -> tuple[str, str]:
-        """Return the sign in front of *text*, empty if there is none, and the rest."""
-        return (text[0], text[1:]) if self.are_used and text and text[0] in SIGNS else ("", text)
+        """Return the sign in front of *text*, empty if there is none, and the rest; noise in front is left out."""
+        if not self.are_used:
+            return "", text
+        text = text[text.rfind(self._last) :] if self._last in text else text
+        return (text[0], text[1:]) if text and text[0] in SIGNS else ("", text)
 
     def is_last(self, sign: str) -> bool:
         """Whether it was said last."""
