@@ -1,6 +1,6 @@
 # One virtual environment a purpose, each made from nothing but Python 3.11+ and make.
 .DEFAULT_GOAL := help
-.PHONY: help demo test check matrix docs torture fuzz hunt clean
+.PHONY: help demo test lint check matrix docs torture fuzz hunt clean
 
 # The first Python 3.11 or newer that really starts; PYTHON=... forces one.
 PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11 python; do \
@@ -14,18 +14,18 @@ help:  ## say what there is
 demo: $(VENV)/demo.ready  ## three simulated drives, homed and moved at once, with live positions
 	@$(BIN)/python -m compax_aio.cli.demo
 
-test: $(VENV)/test.ready  ## all tests
-	$(BIN)/python -m pytest
+test: $(VENV)/test.ready  ## all tests, and how much of the code they reach
+	$(BIN)/coverage erase
+	$(BIN)/coverage run -m pytest
+	$(BIN)/coverage report
 
-check: $(VENV)/check.ready  ## format, lint, types, import contracts, docs, and all tests with coverage
+lint: $(VENV)/check.ready  ## format, lint, types, import contracts
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(MAKE) docs
-	$(BIN)/coverage erase
-	$(BIN)/coverage run -m pytest
-	$(BIN)/coverage report
+
+check: lint docs test  ## lint, docs, and all tests
 
 docs: $(VENV)/check.ready  ## the documents, in docs/_build/html
 	$(BIN)/sphinx-build -q -W --keep-going -b html docs docs/_build/html
