@@ -204,7 +204,8 @@ async def test_progress_tells_how_far_it_is_from_its_start_to_its_end() -> None:
         last: CutProgress = seen[-1]
         assert (last.bytes_sent, last.bytes_total) == (len(job), len(job))
         assert last.instructions_sent == last.instructions_total
-        assert last.position_steps == expected_vectors(job)[-1][2:4]
+        end: object = expected_vectors(job)[-1][2:4]
+        assert last.position_steps == end
         assert [each.bytes_sent for each in seen] == sorted(each.bytes_sent for each in seen)
         assert any(each.free_bytes is not None and each.free_bytes < 1024 for each in seen)
 

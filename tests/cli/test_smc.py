@@ -326,7 +326,8 @@ def test_a_search_that_is_interrupted_says_whom_it_has_stopped(compax: Compax, o
     on_stage(14.5, ctrl_c)
     code, text = compax("stop", BUS)
     assert code == 130
-    assert "Interrupted. Acknowledged the stop, and stand: axis X, axis Y, axis Z. Not every name had been asked." in text
+    stand = "Acknowledged the stop, and stand: axis X, axis Y, axis Z."
+    assert f"Interrupted. {stand} Not every name had been asked." in text
 
 
 def test_a_search_that_is_interrupted_before_it_finds_any_says_so(compax: Compax, on_stage: Plan) -> None:
