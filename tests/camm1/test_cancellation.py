@@ -233,6 +233,38 @@ async def test_an_abort_goes_on_although_answers_are_lost() -> None:
             await check_usable(on)
 
 
+@pytest.mark.parametrize("hold", ["pause", "setup"])
+async def test_a_machine_that_is_held_in_the_middle_of_an_abort_is_told(hold: str) -> None:
+    settings = CutterSettings(baud_rate=9600, stop_timeout_s=4, cutting_timeout_s=1)
+    async with bench(settings, fails_to_close=True) as on:
+        press = on.far.press_pause if hold == "pause" else on.far.press_setup
+        cut = on.cutter.cut("PD0,8000;PD0,0;" * 30)
+        await asyncio.sleep(2)
+        aborting = asyncio.create_task(cut.abort())
+        await asyncio.sleep(0.3)
+        press()
+        await asyncio.wait([aborting, asyncio.create_task(asyncio.sleep(30))])
+        held = aborting.exception()
+        if held is not None:
+            assert on.cutter.in_doubt
+        press()
+        await until(lambda: on.far.is_idle)
+        await on.cutter.stop()
+        on.far.new_sheet()
+        await on.cutter.cut(SQUARE)
+
+
+async def test_an_abort_that_nobody_hears_is_told_in_bounded_time_and_may_be_repeated() -> None:
+    async with bench(CutterSettings(baud_rate=9600, stop_timeout_s=3)) as on:
+        on.far.power_off()
+        started = now()
+        with pytest.raises(CompaxError):
+            await on.cutter.stop()
+        assert now() - started < 30
+        on.far.power_on()
+        await on.cutter.stop()
+
+
 async def test_an_abort_waits_for_a_line_that_was_lost_just_now() -> None:
     async with bench() as on:
         cut = on.cutter.cut(JOB)

@@ -640,6 +640,69 @@ async def test_a_job_is_not_told_as_cut_while_its_last_vector_is_made() -> None:
             assert on.far.position() == (2000, 0, False)
 
 
+async def test_an_answer_behind_the_job_that_is_lost_is_asked_for_again() -> None:
+    for lost in (1, 2):
+        async with bench(CutterSettings(baud_rate=9600, cutting_timeout_s=2)) as on:
+            cut = on.cutter.cut(SQUARE)
+            await until(lambda on=on: any(each.text == "OA" for each in on.far.log))  # type: ignore[misc]
+            on.far.trouble.replies_to_lose = lost
+            assert (await cut).proved_by == "OA"
+
+
+async def test_an_answer_about_the_language_that_is_lost_leaves_the_job_in_doubt() -> None:
+    async with bench(CutterSettings(baud_rate=9600, cutting_timeout_s=2)) as on:
+
+        def lose(*_: Any) -> None:
+            if any(each.text == "OE" for each in list(on.far.log)[-1:]):
+                on.far.trouble.replies_to_lose = 1
+
+        on.far.log.on_entry = lose
+        error = await ending(on.cutter.cut(SQUARE))
+        assert isinstance(error, MoveInDoubtError)
+        assert "OE was not answered" in str(error)
+
+
+async def test_a_machine_that_is_paused_at_the_very_end_is_waited_for() -> None:
+    async with bench(CutterSettings(baud_rate=9600, cutting_timeout_s=2)) as on:
+        cut = on.cutter.cut(SQUARE)
+        await until(lambda: any(each.text == "OA" for each in on.far.log))
+        on.far.press_pause()
+        await asyncio.sleep(30)
+        assert not cut.done()
+        on.far.press_pause()
+        assert (await cut).proved_by == "OA"
+
+
+async def test_a_line_that_is_lost_at_the_very_end_leaves_the_job_in_doubt() -> None:
+    async with bench() as on:
+        cut = on.cutter.cut(SQUARE)
+        await until(lambda: any(each.text == "OA" for each in on.far.log))
+        on.lose_line()
+        assert isinstance(await ending(cut), MoveInDoubtError)
+
+
+async def test_an_error_of_the_language_that_ruins_nothing_is_a_warning() -> None:
+    async with bench() as on:
+
+        def err(*_: Any) -> None:
+            if any(each.text == "OE" for each in list(on.far.log)[-1:]):
+                on.far._machine.data_error = 5
+
+        on.far.log.on_entry = err
+        result = await on.cutter.cut(SQUARE)
+        assert any("error 5 of OE" in each for each in result.warnings)
+
+
+async def test_a_paused_job_that_is_paused_before_it_began_waits() -> None:
+    async with bench() as on:
+        cut = on.cutter.cut(SQUARE)
+        await cut.pause()
+        await asyncio.sleep(10)
+        assert not vectors(on.far)
+        await cut.resume()
+        await cut
+
+
 async def test_the_account_says_what_was_sent_and_taken_and_where_that_stands_in_the_job() -> None:
     job = "IN;PA;\n" + "\n".join(f"PD{100 * each},0;" for each in range(1, 300)) + "\nPU;"
     async with bench() as on:
