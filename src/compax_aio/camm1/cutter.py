@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable
-from contextlib import suppress
 from types import TracebackType
-from typing import Final, Self, TypeVar
+from typing import Self
 
 from ..errors import (
-    AnswerTimeoutError,
     ConnectionLostError,
     InvalidCommandError,
     MoveInDoubtError,
-    UnexpectedAnswerError,
 )
 from ..escaping import shown
 from ..link.cancellation import despite_cancellation
@@ -37,6 +33,7 @@ from .cutting import Cutting, Order
 from .events import CutterReset
 from .facts.reports import OUTPUT_INSTRUCTIONS
 from .feed import JobSource, as_source
+from .greeting import Greeting
 from .instructions import AskBufferSize, encode
 from .line import CutterLine
 from .profiles import Profile
@@ -50,11 +47,6 @@ __all__ = ["Cutter"]
 
 _log = logging.getLogger("compax_aio.camm1")
 
-_T = TypeVar("_T")
-
-_ATTEMPTS: Final = 3
-_IDENTITY: Final = "OI"
-
 
 class Cutter:
     """
@@ -63,17 +55,11 @@ class Cutter:
     Attributes:
         name: For errors, logs and results.
         profile: Which machine it is.
-        capacity_bytes: Of its buffer: the most that it has said to be free; None until it was empty when asked.
-        identity: What it answers when it is asked who it is; None: it does not, or was not asked.
-        errors_found: Errors of the line (``.E``) that it told when the line was opened, which has cleared them.
     """
 
     def __init__(self, name: str, profile: Profile, settings: CutterSettings) -> None:
         self.name = name
         self.profile = profile
-        self.capacity_bytes: int | None = None
-        self.identity: str | None = None
-        self.errors_found: tuple[int, ...] = ()
         self._events = EventHub()
         self._loop = asyncio.get_running_loop()
         self._line = CutterLine(
@@ -82,10 +68,11 @@ class Cutter:
             settings,
             on_event=self._on_event,
             on_lost=self._on_lost,
-            greet=self._greet,
+            greet=self._meet,
             on_down=self._on_down,
             on_restored=self._on_restored,
         )
+        self._greeting = Greeting(self._line)
         self._reports = CutReports(self._line)
         self._cutting: Cutting | None = None
         self._doubt: str | None = None
@@ -225,6 +212,23 @@ class Cutter:
         """The job under way, or the last one; None: there was none."""
         return self._cutting.cut if self._cutting is not None else None
 
+    # What is known of it --------------------------------------------------------------------------------------------
+
+    @property
+    def capacity_bytes(self) -> int | None:
+        """Of its buffer: the most that it has said to be free; None until it was empty when asked."""
+        return self._greeting.capacity_bytes
+
+    @property
+    def identity(self) -> str | None:
+        """What it answers when it is asked who it is; None: it does not, or was not asked."""
+        return self._greeting.identity
+
+    @property
+    def errors_found(self) -> tuple[int, ...]:
+        """Errors of the line (``.E``) that it told when the line was opened, which has cleared them."""
+        return self._greeting.errors_found
+
     # Asking ---------------------------------------------------------------------------------------------------------
 
     async def free_space(self) -> int:
@@ -292,7 +296,7 @@ class Cutter:
             UnexpectedAnswerError, AnswerTimeoutError, ConnectionLostError: It was not told.
         """
         self._refuse_in_job("the question who it is")
-        self.identity = await self._ask_identity(Lane.READ) or self.identity
+        self._greeting.identity = await self._greeting.ask_identity(Lane.READ) or self.identity
         return self.identity
 
     def _refuse_in_job(self, what: str) -> None:
@@ -352,51 +356,8 @@ class Cutter:
 
     # What the line tells --------------------------------------------------------------------------------------------
 
-    async def _greet(self) -> None:
-        """Forget what others have set up, and look who is there; an answer or two may get lost."""
-        line, lane = self._line, Lane.GREETING
-        self.errors_found = await _patiently(lambda: line.errors(lane))  # of others: before one can be ours
-        for code in self.errors_found:
-            _log.info("%s: error %d of the line was told when it was opened", self.name, code)
-        await _patiently(lambda: line.tell(reset_words(self.profile), lane, what="what sets up the line"))
-        status = await _patiently(lambda: line.status(lane))
-        if not line.protocol.has_signs:
-            _log.warning(
-                "%s puts no sign in front of its replies (ESC.M P6): late ones are told by their time alone, and "
-                "nobody sees that it was switched off and on",
-                self.name,
-            )
-        await _patiently(self._look_who_is_there)
-        if status.buffer_is_empty:
-            self.capacity_bytes = max(await _patiently(lambda: line.free_space(lane)), self.capacity_bytes or 0)
-
-    async def _look_who_is_there(self) -> None:
-        self._compare(await self._ask_identity(Lane.GREETING))
-
-    async def _ask_identity(self, lane: Lane) -> str | None:
-        if "A" in self.profile.controls and self.profile.model_answer is not None:
-            return await self._line.model(lane)
-        status = await self._line.status(lane)
-        may_be_asked = status.buffer_is_empty and not status.is_paused and not status.is_suspended
-        if _IDENTITY not in self.profile.mnemonics or self.profile.identity is None or not may_be_asked:
-            return None
-        return await self._line.ask(f"{_IDENTITY};", lane, repeats=False)
-
-    def _compare(self, answer: str | None) -> None:
-        """Compare who answers with who should be there, and with who was."""
-        if answer is None:
-            return
-        answer = answer.partition(",")[0].strip()  # an HP 7550A tells its firmware, too
-        expected = self.identity or self.profile.model_answer or self.profile.identity
-        if expected is not None and answer != expected:
-            raise UnexpectedAnswerError(
-                f"the machine says it is {answer!r}, not {expected!r}",
-                device=self.name,
-                received=answer,
-                hint=f"is it a {self.profile.name}? Choose another profile; or put what it answers into this one",
-                exchanges=self._line.link.recent(),
-            )
-        self.identity = answer
+    async def _meet(self) -> None:
+        await self._greeting.meet()
 
     def _publish(self, event: DriveEvent) -> None:
         self._events.publish(event)
@@ -425,11 +386,3 @@ class Cutter:
 
     def _on_lost(self, error: ConnectionLostError) -> None:
         self._on_down(error)
-
-
-async def _patiently(question: Callable[[], Awaitable[_T]]) -> _T:
-    """Ask a few times, if need be; a line on which nobody answers at all raises at once, when it is opened."""
-    for _ in range(_ATTEMPTS - 1):
-        with suppress(AnswerTimeoutError, UnexpectedAnswerError):
-            return await question()
-    return await question()
