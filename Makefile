@@ -1,6 +1,6 @@
 # One virtual environment a purpose, each made from nothing but Python 3.11+ and make.
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint check matrix docs torture fuzz hunt clean
+.PHONY: help demo test lint check matrix docs torture fuzz cutting hunt clean
 
 # The first Python 3.11 or newer that really starts; PYTHON=... forces one.
 PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11 python; do \
@@ -40,6 +40,9 @@ torture:  ## who gets whose answer after a time-out, here and with other librari
 fuzz:  ## every parser with bytes that nobody thought of, FUZZ_S seconds each (60)
 	@$(MAKE) --no-print-directory VENV=.venv-fuzz .venv-fuzz/fuzz.ready
 	@.venv-fuzz/bin/python -m fuzz all -max_total_time=$(or $(FUZZ_S),60)
+
+cutting: $(VENV)/test.ready  ## how much of the wire a cutting job of megabytes gets, by each handshake
+	@$(BIN)/python -m benchmarks.cutting
 
 hunt: $(VENV)/test.ready  ## whole applications in trouble, seed after seed, for HUNT_MINUTES (30); HUNT_DEVICE=smc
 	@$(BIN)/python -m compax_aio.simulator.hunt --device $(or $(HUNT_DEVICE),compax) --minutes $(or $(HUNT_MINUTES),30)
