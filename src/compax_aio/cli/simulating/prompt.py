@@ -69,10 +69,12 @@ async def _converse(hands: Hands, say: Callable[[str], None]) -> None:
 async def _read_lines(hands: Hands, say: Callable[[str], None]) -> None:
     """Carry out lines from a pipe or file; returns at its end, or waits for ever where there is no such thing."""
     try:
-        stdin = sys.stdin.fileno()
+        # One of our own: the thread may read on when this one is closed, and its number is another file's.
+        stdin = os.dup(sys.stdin.fileno())
     except (AttributeError, OSError, ValueError):
         return
     if os.isatty(stdin) and _is_in_background():
+        os.close(stdin)
         return
     lines: asyncio.Queue[str | None] = asyncio.Queue()
     loop = asyncio.get_running_loop()
@@ -88,6 +90,7 @@ async def _read_lines(hands: Hands, say: Callable[[str], None]) -> None:
                     loop.call_soon_threadsafe(lines.put_nowait, each.decode("utf-8", "replace"))
             loop.call_soon_threadsafe(lines.put_nowait, rest.decode("utf-8", "replace"))
             loop.call_soon_threadsafe(lines.put_nowait, None)
+        os.close(stdin)
 
     threading.Thread(target=read, daemon=True, name="reads the standard input").start()
     while not hands.wants_end:
