@@ -149,7 +149,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--handshake", choices=HANDSHAKES, action="append", help="only this one; may be repeated")
     parser.add_argument("--buffer", type=int, action="append", help="only this size; may be repeated")
     asked = parser.parse_args(arguments)
-    logging.getLogger("compax_aio").setLevel(logging.ERROR)
+    logging.disable(logging.WARNING)
     job = job_of(round(asked.megabytes * 1_000_000))
     outcomes = []
     for handshake in asked.handshake or HANDSHAKES:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -12,6 +14,12 @@ from compax_aio.camm1.pacing import HANDSHAKES, Handshake
 
 PAGE = Path(__file__).parents[2] / "docs" / "camm1.md"
 SMALL, LARGE = 200_000, 5_000_000
+
+
+@pytest.fixture(autouse=True)
+def logging_as_before() -> Iterator[None]:
+    yield
+    logging.disable(logging.NOTSET)
 
 
 @pytest.mark.parametrize("size", SIZES)
