@@ -3,61 +3,17 @@
 from __future__ import annotations
 
 import asyncio
-import os
-import re
-import sys
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from typing import Any
 
-import pexpect
 import pytest
+from tests.fakes.terminal import LIMIT_S, Terminal
 
 from compax_aio.simulator.camm1 import Knobs, LogKind, SimulatedCutter
 from compax_aio.simulator.server import serve_pty, serve_tcp
 
 pytestmark = pytest.mark.real_time
-
-_CONTROL = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
-
-LIMIT_S = 60.0
-"""Generous: a busy machine takes its time to start a process."""
-
-
-class Terminal:
-    """A terminal in which one command runs, while this event loop serves its cutter."""
-
-    def __init__(self, *words: str) -> None:
-        self.child = pexpect.spawn(
-            sys.executable,
-            ["-m", "compax_aio.cli", "camm1", *words],
-            env={**os.environ, "TERM": "xterm", "NO_COLOR": "1"},
-            encoding="utf-8",
-            dimensions=(30, 200),
-            timeout=LIMIT_S,
-        )
-
-    async def sees(self, text: str) -> None:
-        """Wait until the command has written *text*."""
-        await asyncio.to_thread(self.child.expect_exact, text)
-
-    def types(self, text: str) -> None:
-        """Press keys."""
-        self.child.send(text)
-
-    async def ends(self) -> tuple[int, str]:
-        """Wait for the end; returns the exit code, and what was written since what was seen last."""
-        await asyncio.to_thread(self.child.expect, pexpect.EOF)
-        await asyncio.to_thread(self.child.wait)
-        self.child.close()
-        assert self.child.exitstatus is not None, f"ended by signal {self.child.signalstatus}"
-        return self.child.exitstatus, " ".join(_CONTROL.sub("", str(self.child.before)).split())
-
-    def is_shut(self) -> None:
-        """Be gone, as a window that somebody closes."""
-        nowhere = os.open(os.devnull, os.O_RDWR)
-        os.dup2(nowhere, self.child.child_fd)
-        os.close(nowhere)
 
 
 @pytest.fixture
@@ -65,7 +21,7 @@ async def open_terminal() -> AsyncIterator[Callable[..., Terminal]]:
     terminals: list[Terminal] = []
 
     def open_one(*words: str) -> Terminal:
-        terminals.append(Terminal(*words))
+        terminals.append(Terminal("camm1", *words))
         return terminals[-1]
 
     yield open_one
