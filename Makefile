@@ -1,6 +1,6 @@
 # One virtual environment a purpose, each made from nothing but Python 3.11+ and make.
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint check matrix docs torture fuzz cutting hunt clean
+.PHONY: help demo test lint check matrix docs bench bench-full torture fuzz cutting hunt clean
 
 # The first Python 3.11 or newer that really starts; PYTHON=... forces one.
 PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11 python; do \
@@ -9,7 +9,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 help:  ## say what there is
-	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*##/\t/' | expand -t 10
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*##/\t/' | expand -t 12
 
 demo: $(VENV)/demo.ready  ## three simulated drives, homed and moved at once, with live positions
 	@$(BIN)/python -m compax_aio.cli.demo
@@ -33,6 +33,14 @@ docs: $(VENV)/check.ready  ## the documents, in docs/_build/html
 matrix:  ## all tests on every CPython from 3.11 up that this machine has
 	@$(PYTHON) .ci/matrix.py
 
+bench:  ## what each thing costs, beside its target and what others take, in some minutes
+	@$(MAKE) --no-print-directory VENV=.venv-bench .venv-bench/bench.ready
+	@.venv-bench/bin/python -m benchmarks --json .bench/short.json
+
+bench-full:  ## the same in longer rounds
+	@$(MAKE) --no-print-directory VENV=.venv-bench .venv-bench/bench.ready
+	@.venv-bench/bin/python -m benchmarks --full --json .bench/full.json
+
 torture:  ## who gets whose answer after a time-out, here and with other libraries
 	@$(MAKE) --no-print-directory VENV=.venv-bench .venv-bench/bench.ready
 	@.venv-bench/bin/python -m benchmarks.torture
@@ -48,7 +56,7 @@ hunt: $(VENV)/test.ready  ## whole applications in trouble, seed after seed, for
 	@$(BIN)/python -m compax_aio.simulator.hunt --device $(or $(HUNT_DEVICE),compax) --minutes $(or $(HUNT_MINUTES),30)
 
 clean:  ## forget the virtual environments and everything built
-	rm -rf .venv .venv-* build dist docs/_build .coverage .coverage.* .pytest_cache .mypy_cache .ruff_cache .hypothesis .fuzz
+	rm -rf .bench .venv .venv-* build dist docs/_build .coverage .coverage.* .pytest_cache .mypy_cache .ruff_cache .hypothesis .fuzz
 
 $(VENV)/pip.ready:
 	@test -n "$(PYTHON)" || { echo "compax_aio needs Python 3.11 or newer; set PYTHON=/path/to/python3.11"; exit 1; }
