@@ -1,0 +1,1 @@
+"""Far ends that are never the bottleneck, each in a process of its own."""
