@@ -9,6 +9,9 @@ from typing import Any, Final, Literal, get_args
 
 from ..errors import InvalidCommandError
 from ..escaping import shown
+from .facts.eob import EobPattern
+from .facts.port_settings import BAUD_RATES
+from .facts.programs import PROTECTED_PROGRAMS
 
 __all__ = [
     "CLASSIC",
@@ -18,7 +21,6 @@ __all__ = [
     "DATA_COLLECTION",
     "DATA_COLLECTION_19200",
     "DATA_COLLECTION_115200",
-    "EOB_BYTES",
     "NEXT_GENERATION",
     "PROFILES",
     "DataCollection",
@@ -40,13 +42,6 @@ DataCollection = Literal["rs-232", "ethernet"]
 """Where the control answers questions (Setting 143)."""
 ParityIn = Literal["port", "bytes"]
 """Who makes and checks the parity bit: the serial port, or this end, in the bytes themselves."""
-
-EOB_BYTES: Final[Mapping[str, bytes]] = MappingProxyType(
-    {"cr lf": b"\r\n", "lf": b"\n", "cr": b"\r", "cr cr": b"\r\r", "lf lf": b"\n\n"}
-)
-
-_BAUD_RATES: Final = (50, 110, 200, 300, 600, 1200, 2400, 4800, 7200, 9600, 19200, 38400, 115200)
-"""Of Setting 11."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,7 +87,7 @@ class Profile:
     request_prefix: str = ""
     request_end: str = "\r\n"
     parity_in: ParityIn = "port"
-    protected: tuple[tuple[int, int], ...] = ((8000, 9999),)
+    protected: tuple[tuple[int, int], ...] = ((PROTECTED_PROGRAMS[0], PROTECTED_PROGRAMS[-1]),)
     remarks: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
@@ -124,7 +119,7 @@ class Profile:
     @property
     def eob_bytes(self) -> bytes:
         """What ends a block that this end sends."""
-        return EOB_BYTES[self.eob]
+        return EobPattern(self.eob).data
 
     @property
     def bits_per_character(self) -> int | None:
@@ -145,7 +140,10 @@ _Expected = tuple[Callable[[Any], bool], str]
 
 
 def _is_one_of(choices: tuple[object, ...]) -> Callable[[Any], bool]:
-    return lambda value: any(value == each and type(value) is type(each) for each in choices)
+    # A member of an enumeration of the facts is as good as its text; True is no 1.
+    return lambda value: any(
+        value == each and (type(value) is type(each) or isinstance(value, str)) for each in choices
+    )
 
 
 def _one_of(*choices: object, or_unknown: bool = True) -> _Expected:
@@ -166,7 +164,7 @@ def _are_spans(value: object) -> bool:
 
 _EXPECTED: Final[Mapping[str, _Expected]] = {
     "name": (_is_text, "a printable text"),
-    "baudrate": _one_of(*_BAUD_RATES),
+    "baudrate": _one_of(*BAUD_RATES),
     "parity": _one_of(*get_args(Parity)),
     "stop_bits": _one_of(1, 2),
     "synchronization": _one_of(*get_args(Synchronization)),
