@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from compax_aio.camm1.bursting import Burst, LineLevel
+from compax_aio.camm1.bursting import Burst
 from compax_aio.camm1.handshakes import pacing_of
 from compax_aio.camm1.pacing import Handshake
 from compax_aio.camm1.protocol import CutterProtocol
@@ -28,6 +28,7 @@ from compax_aio.camm1.settings import CutterSettings
 from compax_aio.camm1.signs import SIGNS
 from compax_aio.errors import LinkProtocolError
 from compax_aio.link.contract import Event, GoesOn, InStep, LateEnding
+from compax_aio.link.level import LineLevel
 
 KILL, ABORT = "\x1b.K", b"\x1b.J"
 STATUS, FREE = b"\x1b.O", b"\x1b.B"

@@ -6,10 +6,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from ..link.level import LineLevel
 from .pacing import Doing, Pacing
 from .settings import CutterSettings
 
-__all__ = ["Burst", "BurstWriter", "LineLevel"]
+__all__ = ["Burst", "BurstWriter"]
 
 _SHORTEST_PAUSE_S: Final = 0.001
 
@@ -46,28 +47,6 @@ class Burst:
         self.written += 1
         self.written_bytes += len(data)
         return data
-
-
-@dataclass(slots=True)
-class LineLevel:
-    """
-    What is known of the line that bytes go out on.
-
-    Attributes:
-        bytes_per_s: How fast it sends; None: nobody knows.
-        unsent: Says how many bytes that were written have not left yet.
-    """
-
-    bytes_per_s: float | None = None
-    unsent: Callable[[], int] = lambda: 0
-
-    def waiting(self, more_bytes: int = 0) -> int | None:
-        """Return how many bytes wait to leave, with *more_bytes* that are about to be written; None: nobody knows."""
-        return None if self.bytes_per_s is None else self.unsent() + more_bytes
-
-    def leaves_s(self, more_bytes: int = 0) -> float:
-        """Return how long it takes until all has left that was written."""
-        return (self.waiting(more_bytes) or 0) / self.bytes_per_s if self.bytes_per_s else 0.0
 
 
 class BurstWriter:

@@ -9,12 +9,13 @@ from typing import Final, TypeVar
 
 from ..errors import CommandRejectedError, CompaxError, ConnectionLostError, TransportError, UnexpectedAnswerError
 from ..link.contract import Event, Lane, TurnOver
+from ..link.level import LineLevel
 from ..link.link import Link
 from ..link.reconnecting import Reconnecting, Restored
 from ..link.taps import plain
 from ..transports.line_settings import LineSettings
 from ..transports.url import TransportURL
-from .bursting import Burst, LineLevel
+from .bursting import Burst
 from .facts.line import BITS_PER_CHARACTER_8N1, bits_per_character
 from .facts.reports import IO_ERRORS, NO_ERROR
 from .instructions import AbortCutting, AskError, AskFreeSpace, AskModel, AskStatus, encode

@@ -20,7 +20,8 @@ from typing import Final
 
 from ..errors import LinkProtocolError
 from ..link.contract import Event, GoesOn, Hold, InStep, LateEnding, Stranger
-from .bursting import Burst, BurstWriter, LineLevel
+from ..link.level import LineLevel
+from .bursting import Burst, BurstWriter
 from .facts.line import CARRIAGE_RETURN, ESCAPE, LINE_FEED
 from .handshakes import HEARD
 from .pacing import FLOW_SIGNS, Doing, Pacing
