@@ -96,8 +96,8 @@ class ExchangeQueue:
         """Of those who share the line, whose exchanges stay where they are."""
         self.is_admitted = True
         """Unless set, nothing goes that is less urgent than the look at who is there."""
-        self._parties: dict[str, tuple[deque[Exchange], ...]] = {}
-        """By party, whose turn it is first: a queue for each lane."""
+        self._parties: dict[str, dict[Lane, deque[Exchange]]] = {}
+        """By party, whose turn it is first: a queue for each lane in which something waits."""
         self._reads: dict[str, Exchange] = {}
 
     def put(self, exchange: Exchange) -> None:
@@ -107,12 +107,20 @@ class ExchangeQueue:
                 shared.add_waiters(exchange.waiters)
                 return
             self._reads[exchange.text] = exchange
-        if exchange.party not in self._parties:
-            self._parties[exchange.party] = tuple(deque() for _ in Lane)
-        self._parties[exchange.party][exchange.lane].append(exchange)
+        waiting = self._parties.setdefault(exchange.party, {})
+        if exchange.lane not in waiting:
+            waiting[exchange.lane] = deque()
+        waiting[exchange.lane].append(exchange)
+
+    @property
+    def lets_pass(self) -> bool:
+        """Whether what is asked now is what is sent next, whatever it is: nothing waits, and nothing is held back."""
+        return not (self._parties or self.held or self.reads_are_held) and self.is_admitted
 
     def take_next(self) -> Exchange | None:
         """Take out what is to be sent next; what nobody waits for any more is dropped."""
+        if not self._parties:
+            return None
         for lane in _AHEAD_OF_ALL:
             if (exchange := self._take((lane,))) is not None:
                 return exchange
@@ -125,28 +133,40 @@ class ExchangeQueue:
             if party in self.held:
                 continue
             for lane in lanes:
-                while waiting[lane]:
-                    exchange = waiting[lane].popleft()
-                    if lane is Lane.READ:
-                        del self._reads[exchange.text]
-                    if exchange.is_wanted:
-                        self._end_turn(party)
-                        return exchange
+                if lane in waiting and (exchange := self._take_wanted(waiting, lane)) is not None:
+                    self._end_turn(party)
+                    return exchange
         return None
+
+    def _take_wanted(self, waiting: dict[Lane, deque[Exchange]], lane: Lane) -> Exchange | None:
+        queued, wanted = waiting[lane], None
+        while queued and wanted is None:
+            exchange = queued.popleft()
+            if lane is Lane.READ:
+                del self._reads[exchange.text]
+            wanted = exchange if exchange.is_wanted else None
+        if not queued:
+            del waiting[lane]
+        return wanted
 
     def _end_turn(self, party: str) -> None:
         waiting = self._parties.pop(party)
-        if any(waiting):
+        if waiting:
             self._parties[party] = waiting  # behind the others
 
     def first_stop(self) -> Exchange | None:
         """Find the stop that goes first, and leave it where it is."""
-        stops = (each for party, lanes in self._parties.items() if party not in self.held for each in lanes[Lane.STOP])
+        stops = (
+            each
+            for party, lanes in self._parties.items()
+            if party not in self.held
+            for each in lanes.get(Lane.STOP, ())
+        )
         return next((stop for stop in stops if stop.is_wanted), None)
 
     def take_all(self) -> list[Exchange]:
         """Take out everything, the most urgent first."""
-        waiting = [exchange for lane in Lane for lanes in self._parties.values() for exchange in lanes[lane]]
+        waiting = [exchange for lane in Lane for lanes in self._parties.values() for exchange in lanes.get(lane, ())]
         self._parties.clear()
         self._reads.clear()
         return waiting

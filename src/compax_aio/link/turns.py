@@ -119,9 +119,14 @@ class Turns:
         return not (self._protocol.is_busy or self._protocol.in_doubt or self._is_reading)
 
     def put(self, exchange: Exchange) -> None:
-        """Queue *exchange*, and write it if the line is free."""
-        self.queue.put(exchange)
-        self._ensure_doubt_is_pursued()
+        """Queue *exchange*, and write it if the line is free; what need not wait is not queued at all."""
+        if self.is_free and self.queue.lets_pass and self._port.is_there and not self._is_ended:
+            self._begin(exchange)
+            if self._protocol.is_busy:
+                return
+        else:
+            self.queue.put(exchange)
+            self._ensure_doubt_is_pursued()
         self.pump()
 
     def say_ahead(self, stop: Exchange) -> None:
@@ -214,16 +219,20 @@ class Turns:
                         self._give_up()
                     return
             elif (exchange := self.queue.take_next()) is not None:
-                self._outstanding = exchange
-                protocol.send(exchange.text)
-                exchange.is_on_wire = True
-                self._flush(Way.TURN, exchange)
-                self._began_at = self._loop.time()
-                self._give_time()
-                if exchange.on_sent is not None:
-                    exchange.on_sent()
+                self._begin(exchange)
             else:
                 return
+
+    def _begin(self, exchange: Exchange) -> None:
+        """Send *exchange* in its turn."""
+        self._outstanding = exchange
+        self._protocol.send(exchange.text)
+        exchange.is_on_wire = True
+        self._flush(Way.TURN, exchange)
+        self._began_at = self._loop.time()
+        self._give_time()
+        if exchange.on_sent is not None:
+            exchange.on_sent()
 
     def _flush(self, way: Way, exchange: Exchange | None = None) -> None:
         if data := self._protocol.bytes_to_send():
