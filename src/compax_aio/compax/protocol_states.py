@@ -48,6 +48,8 @@ class State(Enum):
     FRAME_IN_DOUBT = "a binary motion may have arrived cut: nothing but a stop is sent, for it could complete it"
     AWAITING_STOP = "a binary motion may have arrived cut, a stop is outstanding"
 
+    __hash__ = object.__hash__  # each line that is sent looks a few of them up; enum's own hashes the name in Python
+
 
 @dataclass(frozen=True, slots=True)
 class CommandSent(Event):

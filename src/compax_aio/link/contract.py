@@ -37,6 +37,8 @@ class Lane(IntEnum):
     MOTION = 3
     READ = 4
 
+    __hash__ = int.__hash__  # each line that waits is looked up by it; enum's own hashes the name in Python
+
 
 @dataclass(frozen=True, slots=True)
 class Event:
