@@ -9,7 +9,7 @@ from tests.simulator.camm1.host import Host
 
 from compax_aio.simulator.camm1 import LogKind
 from compax_aio.simulator.camm1.shapes import clipped
-from compax_aio.simulator.camm1.wire import Wire
+from compax_aio.simulator.wire import Wire
 
 
 def _written(*pieces: bytes, overshoot: int = 0) -> Wire:

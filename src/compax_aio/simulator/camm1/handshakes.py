@@ -11,12 +11,12 @@ from compax_aio.camm1.facts.handshakes import OutputKind, xon_when_stored
 from compax_aio.camm1.facts.instructions import DEFAULT_BLOCK_SIZE
 from compax_aio.camm1.facts.line import ACK, DC1, DC3, ENQ
 
+from ..wire import Wire
 from .buffer import Buffer
 from .log import LogKind
 from .surroundings import Surroundings
 from .transmitter import Transmitter
 from .trouble import Trouble
-from .wire import Wire
 
 __all__ = ["Handshakes", "string_of"]
 

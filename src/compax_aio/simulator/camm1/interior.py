@@ -5,6 +5,7 @@ from __future__ import annotations
 from compax_aio.camm1.facts.handshakes import OutputKind
 from compax_aio.camm1.facts.line import SEMICOLON
 
+from ..wire import Wire
 from .buffer import Buffer
 from .control import Control
 from .handshakes import Handshakes
@@ -16,7 +17,6 @@ from .reports import output, status
 from .surroundings import Surroundings
 from .transmitter import Transmitter
 from .trouble import Trouble
-from .wire import Wire
 
 __all__ = ["Interior"]
 

@@ -7,6 +7,7 @@ from typing import Final
 
 from compax_aio.camm1.facts.line import ESCAPE
 
+from ..wire import Wire
 from .buffer import Buffer
 from .control import Control
 from .handshakes import Handshakes
@@ -15,7 +16,6 @@ from .machine import Machine
 from .surroundings import Surroundings
 from .transmitter import Transmitter
 from .trouble import Trouble
-from .wire import Wire
 
 __all__ = ["Reception"]
 
