@@ -1,0 +1,188 @@
+"""The errors that a transfer ends with: what happened, how far it came, and what to do at the control."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final, TypeVar
+
+from ..errors import (
+    AnswerTimeoutError,
+    CommandRejectedError,
+    CompaxError,
+    ConnectionLostError,
+    InvalidCommandError,
+    UnexpectedAnswerError,
+)
+from ..escaping import escaped
+from ..link.link import Link
+from .profiles import Profile
+from .transfer import Damage, Kind, TransferAccount
+from .transfers.account import Ending
+
+__all__ = ["TransferReports", "operator_text", "with_account"]
+
+_Error = TypeVar("_Error", bound=CompaxError)
+
+_SETTINGS: Final = "Settings 11 (baud rate), 12 (parity), 13 (stop bits), 14 (synchronization) and 37 (data bits)"
+_CHOOSE: Final[dict[Kind, str]] = {
+    "program": "choose the program",
+    "programs": "choose ALL programs",
+    "parameters": "show the parameters",
+    "settings": "show the settings",
+    "offsets": "show the offsets",
+    "macros": "show the macro variables",
+}
+_SCREEN: Final = "what the control made of it, its screen says: RS232 DONE or RS232 ABORT, and the alarms"
+
+
+_STORIES: Final[Mapping[Ending, tuple[type[CompaxError], str, str]]] = {
+    Ending.NOT_STARTED: (
+        AnswerTimeoutError,
+        "the control {did_not} the {kind} in time",
+        f"{{operator}}; if that was done, compare {_SETTINGS} with the profile {{profile!r}}, and look whether pins 2 "
+        "and 3 are crossed in the cable, and 4 and 5",
+    ),
+    Ending.WENT_SILENT: (
+        AnswerTimeoutError,
+        "the control has fallen silent in the middle of the {kind}",
+        f"was RESET pressed? {_SCREEN}; then begin anew: a transfer is never resumed",
+    ),
+    Ending.HELD_TOO_LONG: (
+        AnswerTimeoutError,
+        "the control has told to stop (Xoff) and never to go on",
+        f"is its memory full, or does it show an alarm? {_SCREEN}",
+    ),
+    Ending.STUCK: (
+        AnswerTimeoutError,
+        "what was written does not leave the line",
+        "with RTS/CTS the control, or its cable (pins 4 and 5), holds the line; over a network, what is in between",
+    ),
+    Ending.CANCELLED: (CommandRejectedError, "the control has cancelled the transfer (CAN)", _SCREEN),
+    Ending.GARBLED: (
+        UnexpectedAnswerError,
+        "the same block was damaged, or lost, again and again",
+        f"is the line disturbed? Compare {_SETTINGS} with the profile; shorten the cable, or lower the baud rate",
+    ),
+    Ending.TOO_LARGE: (
+        UnexpectedAnswerError,
+        "the {kind} has more bytes than are to be received",
+        "ControlSettings.max_bytes says how many that is; what still comes is dropped",
+    ),
+    Ending.GIVEN_UP: (ConnectionLostError, "the transfer was given up", f"begin anew; {_SCREEN}"),
+}
+
+
+def operator_text(kind: Kind, *, sends: bool) -> str:
+    """Say what has to be done at the control, for a transfer of that kind to begin."""
+    if kind == "drip feed":
+        return "press MDI/DNC twice at the control, so that it waits for the program, and then CYCLE START"
+    key = "RECV" if sends else "SEND"
+    page = "show the list of programs" if sends and kind in {"program", "programs"} else _CHOOSE[kind]
+    return f"at the control, {page} and press {key}"
+
+
+def with_account(error: _Error, account: TransferAccount) -> _Error:
+    """Have *error* tell what is known of the transfer: as ``error.transfer``, and in notes."""
+    error.transfer = account  # type: ignore[attr-defined]  # part of what a control's errors carry
+    error.add_note(f"transfer: {account}")
+    if account.archive is not None:
+        error.add_note(f"what came is in {escaped(str(account.archive))}")
+    return error
+
+
+class TransferReports:
+    """
+    Writes the errors of one control's transfers.
+
+    Args:
+        name: Of the control.
+        profile: How it is set up.
+        link: Its line, whose last bytes every error tells.
+    """
+
+    def __init__(self, name: str, profile: Profile, link: Link) -> None:
+        self._name = name
+        self._profile = profile
+        self._link = link
+
+    def active(self, what: str, under_way: str) -> InvalidCommandError:
+        """Report a transfer that was not begun because there is another one."""
+        return InvalidCommandError(
+            f"{what} was not begun: {under_way} is under way on this line",
+            device=self._name,
+            hint="await that transfer, or cancel() it first",
+        )
+
+    def no_files(self, what: str) -> InvalidCommandError:
+        """Report a transfer over a line that no files go over."""
+        return InvalidCommandError(
+            f"{what} was not begun: the profile {self._profile.name!r} has no synchronization (Setting 14)",
+            device=self._name,
+            hint="take a profile with the one that the control is set to: compax_aio.haas.PROFILES; over Ethernet a "
+            "control answers questions only",
+        )
+
+    def of_ending(self, ending: Ending, account: TransferAccount, detail: str = "") -> CompaxError:
+        """Report a transfer that did not end well, by how it ended."""
+        kind_of_error, what, hint = _STORIES[ending]
+        sends = account.way == "send"
+        words = {
+            "kind": account.kind,
+            "did_not": "was not ready to read" if sends else "did not send",
+            "operator": operator_text(account.kind, sends=sends),
+            "profile": self._profile.name,
+        }
+        more = f" ({detail})" if detail else ""
+        return self._of(kind_of_error, f"{what.format_map(words)}{more}; {account}", account, hint.format_map(words))
+
+    def lost(self, account: TransferAccount, cause: CompaxError | None) -> ConnectionLostError:
+        """Report a transfer whose line was lost, or closed."""
+        why = "the line was lost" if cause is None else cause.what
+        hint = f"a transfer is never resumed: begin anew when the line is back; {_SCREEN}"
+        error = self._of(ConnectionLostError, f"{why}; {account}", account, hint)
+        error.__cause__ = cause
+        return error
+
+    def damaged(self, damage: Damage, account: TransferAccount) -> UnexpectedAnswerError:
+        """Report a file that came damaged."""
+        return self._of(
+            UnexpectedAnswerError,
+            f"the {account.kind} came damaged: {damage}",
+            account,
+            f"receive it again; is the line disturbed, or do {_SETTINGS} differ from the profile? accept_damaged=True "
+            "takes it as it is",
+        )
+
+    def unlike(self, why: CompaxError | str, account: TransferAccount) -> UnexpectedAnswerError:
+        """Report what came and is not of the kind that was asked for."""
+        said = why.what if isinstance(why, CompaxError) else why
+        hint = why.hint if isinstance(why, CompaxError) and why.hint else None
+        error = self._of(
+            UnexpectedAnswerError,
+            f"what came is no file of {account.kind}: {said}",
+            account,
+            hint
+            or f"was something else chosen at the control? To receive it, {operator_text(account.kind, sends=False)}",
+        )
+        if isinstance(why, CompaxError):
+            error.__cause__ = why
+        return error
+
+    def unequal(self, what: str, account: TransferAccount, hint: str) -> UnexpectedAnswerError:
+        """Report a file that is another one at the second look."""
+        return self._of(UnexpectedAnswerError, what, account, hint)
+
+    def unwritten(self, cause: OSError, data: bytes, account: TransferAccount) -> InvalidCommandError:
+        """Report a file that came, and could not be kept."""
+        error = self._of(
+            InvalidCommandError,
+            f"the {account.kind} came, but could not be written to the archive: {cause}",
+            account,
+            "the bytes are error.data; is the disk full?",
+        )
+        error.data = data  # type: ignore[attr-defined]
+        error.__cause__ = cause
+        return error
+
+    def _of(self, kind: type[_Error], what: str, account: TransferAccount, hint: str) -> _Error:
+        return with_account(kind(what, device=self._name, hint=hint, exchanges=self._link.recent()), account)
