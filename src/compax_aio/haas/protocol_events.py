@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..link.contract import Event, TurnLost, TurnOver
-from .transfers.account import TransferAccount
+from .transfers.account import LineAccount
 
 __all__ = [
     "Answered",
@@ -33,7 +33,7 @@ class Answered(TurnOver):
 class TransferOver(TurnOver):
     """A transfer is over, well or not: ``account.ending`` says how."""
 
-    account: TransferAccount
+    account: LineAccount
 
 
 @dataclass(frozen=True, slots=True)

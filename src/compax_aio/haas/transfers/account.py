@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Literal
 
-__all__ = ["Ending", "Phase", "Proof", "TransferAccount"]
+__all__ = ["Ending", "LineAccount", "Phase", "Proof"]
 
 Proof = Literal["reader off seen", "xmodem acknowledged", "left the line"]
 """What is proved of a file that was sent: never that the control has stored it, which only its screen shows."""
@@ -46,7 +46,7 @@ class Ending(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TransferAccount:
+class LineAccount:
     """
     How much of a transfer has gone over the line.
 
@@ -56,6 +56,7 @@ class TransferAccount:
         phase: In which it is, or was when it ended.
         ending: How it ended; None: it is under way.
         bytes: Of the file that have left, as far as can be told, or have come.
+        written_bytes: Of what is sent, that were handed to the line; those that have not left may do so yet.
         total_bytes: Of the file; None: nobody knows.
         lines: Of the file, whole ones, until there.
         blocks: Of XMODEM, that were acknowledged.
@@ -69,6 +70,8 @@ class TransferAccount:
         damaged_bytes: How many did.
         has_dc2: Whether the control began with DC2.
         has_dc4: Whether it ended with DC4.
+        is_closed: Whether the last line that has come, and has anything, is a percent sign: what is received is whole.
+        detail: What is known besides of how it ended; a clause for a person.
         dropped_bytes: Signs of the handshake and leader that came between and are no part of the file.
     """
 
@@ -77,6 +80,7 @@ class TransferAccount:
     phase: Phase
     ending: Ending | None = None
     bytes: int = 0
+    written_bytes: int = 0
     total_bytes: int | None = None
     lines: int = 0
     blocks: int = 0
@@ -91,6 +95,8 @@ class TransferAccount:
     has_dc2: bool = False
     has_dc4: bool = False
     dropped_bytes: int = 0
+    is_closed: bool = False
+    detail: str = ""
 
     @property
     def offset(self) -> int:

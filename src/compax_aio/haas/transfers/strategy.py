@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from ...errors import LinkProtocolError
 from ...link.contract import Event
 from ...link.level import LineLevel
-from .account import Ending, Phase, Proof, TransferAccount
+from .account import Ending, LineAccount, Phase, Proof
 
 __all__ = ["Patience", "Strategy"]
 
@@ -84,7 +84,7 @@ class Strategy(ABC):
         """Go on after a pause, or take note that something did not come in time."""
 
     @abstractmethod
-    def account(self) -> TransferAccount:
+    def account(self) -> LineAccount:
         """Say how much has gone over the line."""
 
     def _begin(self, *, reader_is_on: bool) -> None:  # noqa: B027  # who receives waits
