@@ -1,0 +1,210 @@
+"""Program files: what a control sends and takes, with its programs and blocks, and every byte of it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final, NamedTuple
+
+from ..facts.eob import EobPattern
+from ..facts.programs import MAX_NAME_DIGITS
+from .lines import IGNORED, LINE_ENDS, SKIPPED, Lines, as_bytes
+
+__all__ = ["Block", "Name", "Program", "ProgramFile", "name_of_line", "parse_program_file"]
+
+_NAME: Final = re.compile(rb"[Oo][ \t]*([0-9]*)[ \t]*(\([^)]*\)?)?")
+
+
+class Block(NamedTuple):
+    """One line of a program; a tuple, for a program has a hundred thousand of them."""
+
+    line: int
+    """In the file, from 1."""
+    offset: int
+    """Of its first byte in the file, from 0."""
+    raw: bytes
+    """With its end of block."""
+
+    @property
+    def text(self) -> str:
+        """Without its end, and without what is no text: leader, reader and punch codes."""
+        return self.raw.rstrip(LINE_ENDS).translate(None, IGNORED).decode("latin-1")
+
+    @property
+    def is_blank(self) -> bool:
+        """Whether it holds nothing."""
+        return not self.raw.rstrip(LINE_ENDS).strip(SKIPPED)
+
+
+@dataclass(frozen=True, slots=True)
+class Name:
+    """The ``O`` line that begins a program."""
+
+    text: str
+    """As it is written: ``O05555``."""
+    number: int | None
+    """None if it is no name: no digits, or more than five."""
+    comment: str | None
+    """What stands in parentheses right behind it."""
+
+
+def name_of_line(raw: bytes) -> Name | None:
+    """Return the name that a line begins with, or None if it does not begin with ``O``."""
+    line = raw.rstrip(LINE_ENDS).translate(None, IGNORED).strip(SKIPPED)
+    match = _NAME.match(line)
+    if match is None:
+        return None
+    digits, comment = match[1].decode("ascii"), match[2]
+    is_name = 1 <= len(digits) <= MAX_NAME_DIGITS
+    return Name(
+        text=f"{chr(line[0])}{digits}",
+        number=int(digits) if is_name else None,
+        comment=None if comment is None else comment[1:].rstrip(b")").decode("latin-1"),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Program:
+    """One program of a file."""
+
+    name: Name | None
+    """None if no ``O`` line stands in front of it: a control cannot store it."""
+    blocks: tuple[Block, ...]
+    """All of its lines, that of the name and blank ones too; one behind the other they are its bytes."""
+
+    @property
+    def number(self) -> int | None:
+        """1234 of ``O01234``; None if there is none, or none that is one."""
+        return None if self.name is None else self.name.number
+
+    @property
+    def comment(self) -> str | None:
+        """What stands in parentheses right behind the name."""
+        return None if self.name is None else self.name.comment
+
+    @property
+    def line(self) -> int:
+        """Of its first block in the file, from 1."""
+        return self.blocks[0].line
+
+    @property
+    def offset(self) -> int:
+        """Of its first byte in the file, from 0."""
+        return self.blocks[0].offset
+
+    @property
+    def text(self) -> str:
+        r"""All of it, with ``\n`` behind each block."""
+        return "".join(f"{block.text}\n" for block in self.blocks)
+
+    def __bytes__(self) -> bytes:
+        """Give the bytes it was made of."""
+        return b"".join(block.raw for block in self.blocks)
+
+    def __str__(self) -> str:
+        """Write ``O05555 (CS390_TEST)``."""
+        name = "a program without a name" if self.name is None else self.name.text
+        return name if self.comment is None else f"{name} ({self.comment})"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProgramFile:
+    """
+    A file of one program or several; ``bytes(file)`` are those it was made of.
+
+    Attributes:
+        data: All of its bytes.
+        programs: In their order; empty if there is nothing between the ``%`` lines.
+        lead_in: What stands in front of the first ``%``: an end of block, leader, a punch code. No data.
+        tail: What stands behind the line of the last ``%``: fill, a punch code. No data.
+        payload: From the first ``%`` to the end of the line of the last one.
+        percent_lines: Of each ``%`` alone in its line, from 1.
+        has_start: Whether the data begin with ``%``.
+        has_end: Whether they end with ``%``: else something may be missing.
+        eob: The pattern all lines end with; None if they are mixed, or there is none.
+    """
+
+    data: bytes
+    programs: tuple[Program, ...]
+    lead_in: bytes
+    tail: bytes
+    payload: bytes
+    percent_lines: tuple[int, ...]
+    has_start: bool
+    has_end: bool
+    eob: EobPattern | None
+
+    def __bytes__(self) -> bytes:
+        """Give the bytes it was made of."""
+        return self.data
+
+    def __len__(self) -> int:
+        """How many bytes it has."""
+        return len(self.data)
+
+    def __iter__(self) -> Iterator[Program]:
+        """Give its programs."""
+        return iter(self.programs)
+
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """Of its programs, as far as they have one."""
+        return tuple(each.number for each in self.programs if each.number is not None)
+
+    def program(self, number: int) -> Program | None:
+        """Return the first program of that number, or None."""
+        return next((each for each in self.programs if each.number == number), None)
+
+
+def parse_program_file(text: str | bytes, *, eob: EobPattern | str | None = None) -> ProgramFile:
+    r"""
+    Take a file apart as it comes from a control, or from a disk; nothing is checked, nothing is changed.
+
+    The data stand between the first line that is ``%`` alone and the last one (sheet, section 4; OpenDNC). Where one
+    is missing, they reach to that end of the file. A program begins with each line that begins with ``O``.
+
+    Args:
+        text: Bytes, or text; of a file, read it as bytes.
+        eob: How its lines end, if that is known (Setting 25); it matters for CR CR and LF LF alone: without it, they
+            are one end of block if no end of the whole file is single.
+
+    Raises:
+        InvalidCommandError: A character of the text has no code of 8 bits.
+
+    >>> file = parse_program_file(b"%\nO01234(FIRST)\nG0X0\nM30\n%\n")
+    >>> file.programs[0].number, file.programs[0].comment, len(file.programs[0].blocks)
+    (1234, 'FIRST', 3)
+    """
+    lines = Lines(as_bytes(text), eob)
+    return ProgramFile(
+        data=lines.data,
+        programs=tuple(_programs(lines)),
+        lead_in=lines.lead_in,
+        tail=lines.tail,
+        payload=lines.payload,
+        percent_lines=tuple(at + 1 for at in lines.percents),
+        has_start=lines.start is not None,
+        has_end=lines.end is not None,
+        eob=lines.eob,
+    )
+
+
+def _programs(lines: Lines) -> Iterator[Program]:
+    """Each ``%`` between the first and the last one parts as well: programs that were wrapped one by one."""
+    walls = [at for at in lines.percents if lines.first <= at < lines.behind]
+    begins = [lines.first, *(at + 1 for at in walls)]
+    for begin, end in zip(begins, [*walls, lines.behind], strict=True):
+        yield from _programs_between(lines, begin, end)
+
+
+def _programs_between(lines: Lines, begin: int, end: int) -> Iterator[Program]:
+    raw = lines.raw
+    starts = [at for at in range(begin, end) if raw[at].lstrip(SKIPPED)[:1] in (b"O", b"o")]
+    first = starts[0] if starts else end
+    if not all(map(lines.is_blank, range(begin, first))):
+        starts.insert(0, begin)
+    for at, behind in pairwise([*starts, end]):
+        blocks = zip(range(at + 1, behind + 1), lines.offsets[at:behind], raw[at:behind], strict=True)
+        yield Program(name=name_of_line(raw[at]), blocks=tuple(map(Block._make, blocks)))
