@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Callable
 from typing import Final
+from unittest.mock import patch
 
 import pytest
 from hypothesis import example, given, settings
@@ -711,6 +713,42 @@ def test_how_the_bytes_are_cut_makes_no_difference(
     assert single.events() == expected
     assert pieces.state is single.state is whole.state
     assert pieces.message_form is whole.message_form
+
+
+PIECES_OF_ANSWERS: Final = [
+    "S001",
+    "S1",
+    "S 1",
+    "S0",
+    "S000",
+    "P1",
+    "N5",
+    ":",
+    "=",
+    " ",
+    "\t",
+    ">",
+    "5",
+    "E92",
+    "$",
+    "1",
+]
+
+
+@settings(max_examples=400, deadline=None)
+@given(
+    asked=st.sampled_from(["S1", "S 1", "S01", "P1", "N5", "SD50"]),
+    answer=st.lists(st.sampled_from([*PIECES_OF_ANSWERS, "\r", "\n", "END", "\xb2"]), max_size=7).map("".join),
+)
+@example(asked="S1", answer="S001: 5")
+@example(asked="S1", answer="S1S001: 5")
+def test_an_answer_as_it_nearly_always_is_is_read_as_any_other(asked: str, answer: str) -> None:
+    at_once, at_length = waiting_for(asked), waiting_for(asked)
+    at_once.receive(answer.encode("latin-1") + PROMPT)
+    with patch("compax_aio.compax.protocol.PLAIN_ANSWER", re.compile(r"(?!)")):
+        at_length.receive(answer.encode("latin-1") + PROMPT)
+    assert at_once.events() == at_length.events()
+    assert at_once.state is at_length.state
 
 
 @situations

@@ -292,6 +292,7 @@ def test_a_flood_that_is_no_compax_keeps_memory_bounded() -> None:
     protocol = opened()
     for _ in range(2000):
         protocol.receive(b"U" * 1000)
+    assert protocol._recognition is not None, "as long as no prompt has come"
     assert len(protocol._recognition._received) <= 512
     protocol.time_ran_out()
     protocol.receive(PROMPT + as_drive("S1"))

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections import Counter, deque
+from collections import deque
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 from .binary import is_frame
@@ -15,6 +16,9 @@ __all__ = ["Ledger", "Sent"]
 
 _MAX_LEDGER: Final = 16_384
 """Lines remembered as unanswered: as markers, 64 KiB, which is what a transport takes before it says it is full."""
+
+_TEXTS_KNOWN: Final = 1024
+"""For all drives together: they are asked the same few things again and again."""
 
 _QUERY: Final = re.compile(r"([SPVN])0*(\d{1,3})")
 
@@ -32,8 +36,7 @@ class Sent:
     @classmethod
     def of(cls, text: str, wire: bytes) -> Sent:
         """Take note of *text*, which went out as *wire*."""
-        query = _QUERY.fullmatch(text.replace(" ", ""))
-        return cls(text, wire, (query[1], query[2]) if query else None)
+        return cls(text, wire, _key(text))
 
     @property
     def wants_message(self) -> bool:
@@ -46,6 +49,12 @@ class Sent:
         return is_frame(self.wire)
 
 
+@lru_cache(maxsize=_TEXTS_KNOWN)
+def _key(text: str) -> tuple[str, str] | None:
+    query = _QUERY.fullmatch(text.replace(" ", ""))
+    return (query[1], query[2]) if query else None
+
+
 class Ledger:
     """Unanswered lines; the oldest is forgotten when there are very many, and looking for one takes no longer then."""
 
@@ -56,7 +65,7 @@ class Ledger:
         """Those of them that a bare prompt may belong to."""
         self._owed: deque[Sent] = deque()
         """Those whose ``$`` was asked for."""
-        self._asked: Counter[tuple[str, str]] = Counter()
+        self._asked: dict[tuple[str, str], int] = {}
         """How many queries bear each name."""
 
     def __len__(self) -> int:
@@ -74,7 +83,7 @@ class Ledger:
 
     def asked(self, key: tuple[str, str]) -> Sent | None:
         """Find the oldest query that an answer beginning with *key* can belong to."""
-        return next((sent for sent in self._lines if sent.key == key), None) if self._asked[key] else None
+        return next((sent for sent in self._lines if sent.key == key), None) if self._asked.get(key) else None
 
     def owed_message(self) -> Sent | None:
         """Find the oldest command whose ``$`` was asked for."""
@@ -88,8 +97,10 @@ class Ledger:
 
     def settle(self) -> None:
         """Forget all: it is answered, refused or lost."""
-        for each in (self._lines, self._commands, self._owed, self._asked):
-            each.clear()
+        self._lines.clear()
+        self._commands.clear()
+        self._owed.clear()
+        self._asked.clear()
 
     def settle_up_to(self, sent: Sent) -> None:
         """Forget *sent* and all that is older."""
@@ -105,19 +116,19 @@ class Ledger:
 
     def _add(self, sent: Sent) -> None:
         self._lines.append(sent)
-        if sent.key is None:
-            self._commands.append(sent)
-        else:
-            self._asked[sent.key] += 1
+        if sent.key is not None:
+            self._asked[sent.key] = self._asked.get(sent.key, 0) + 1
+            return
+        self._commands.append(sent)
         if sent.wants_message:
             self._owed.append(sent)
 
     def _forget_oldest(self) -> Sent:
         sent = self._lines.popleft()
-        if sent.key is None:
-            self._commands.popleft()
-        else:
+        if sent.key is not None:
             self._asked[sent.key] -= 1
+            return sent
+        self._commands.popleft()
         if sent.wants_message:
             self._owed.popleft()
         return sent
@@ -127,7 +138,7 @@ class Ledger:
         for _ in MARKERS:
             number = MARKERS[self._next_marker % len(MARKERS)]
             self._next_marker += 1
-            if not self._asked["S", str(number)]:
+            if not self._asked.get(("S", str(number))):
                 break
         # Are all unanswered, it is the last one, again and again: the first answer to it makes the others free.
         return f"S{number}"

@@ -17,7 +17,7 @@ from typing import Final, TypeGuard
 
 from ..errors import LinkProtocolError
 from ..link.contract import Event, Hold, HoldOver, InStep, LateEnding, MarkerSpent, Stranger, TurnOver
-from .answers import ANSWER, COMPARATOR, COMPARATOR_BEFORE, NOT_TEXT, as_text
+from .answers import ANSWER, COMPARATOR, COMPARATOR_BEFORE, LINE_ENDS, NOT_TEXT, PLAIN_ANSWER, as_text
 from .binary import encode_ascii, is_motion_frame
 from .facts.line import ERROR_PATTERN, POSITION_REACHED_SIGN, PROMPT
 from .ledger import Ledger, Sent
@@ -92,7 +92,8 @@ class CompaxProtocol:
         self.encode = encode
         self._error = re.compile(error_pattern)
         self._ledger = Ledger()
-        self._recognition = Recognition()
+        self._recognition: Recognition | None = Recognition()
+        """None once a prompt has come: only a COMPAX sends it."""
         self._motion_frame = ""
         self._stops_answered = 0
         self._received = bytearray()
@@ -132,7 +133,7 @@ class CompaxProtocol:
 
     def stranger(self, *, time_is_over: bool) -> Stranger | None:
         """Say which other device is at the far end, as long as no prompt of a COMPAX has ever come."""
-        return self._recognition.stranger(time_is_over=time_is_over)
+        return self._recognition.stranger(time_is_over=time_is_over) if self._recognition is not None else None
 
     # What the link does ---------------------------------------------------------------------------------------------
 
@@ -144,35 +145,36 @@ class CompaxProtocol:
         self._number_may_follow = False
         # Queries of the old line may still be answered, by a device server; a prompt on the new one proves nothing.
         self._ledger.forget_commands()
-        self._recognition.line_opened()
+        if self._recognition is not None:
+            self._recognition.line_opened()
         self._stops_answered = 0
-        self._step(LineOpened())
+        self._step(LineOpened)
 
     def line_lost(self) -> None:
         """Give up what is outstanding."""
         if self.is_busy:
-            self._step(TimeRanOut())
+            self._step(TimeRanOut)
 
     def send(self, text: str) -> None:
         """Begin the exchange of *text*, one line without its CR."""
         wire = self.encode(text)
         if is_motion_frame(wire):
-            self._step(MotionFrameSent())
+            self._step(MotionFrameSent)
             self._motion_frame = text
             self._stops_answered = 0
         else:
-            self._step(CommandSent())
+            self._step(CommandSent)
         self._write(text, wire)
 
     def send_marker(self) -> None:
         """Ask a status value whose number tells its answer from every other that may still come."""
-        self._step(MarkerSent())
+        self._step(MarkerSent)
         marker = self._ledger.choose_marker()
         self._write(marker, encode_ascii(marker))
 
     def send_ahead(self, text: str) -> None:
         """Send *text*, a stop, although in doubt; whatever comes next ends its turn and proves nothing."""
-        self._step(SentAhead())
+        self._step(SentAhead)
         self._write(text, encode_ascii(text))
 
     def preempt(self, text: str) -> None:
@@ -181,17 +183,19 @@ class CompaxProtocol:
 
     def time_ran_out(self) -> None:
         """Give the outstanding line up; its answer, should it come, is late."""
-        self._step(TimeRanOut())
+        self._step(TimeRanOut)
 
     def resume(self) -> None:
         """Take a person's word that half a binary motion can do no harm any more; else it does nothing."""
         if self.state in HELD:
-            self._step(Resumed())
+            self._step(Resumed)
             # The next prompt may be that of a frame which a marker has completed: it acknowledges no motion.
             self._ledger.forget_commands()
 
     def bytes_to_send(self) -> bytes:
         """Take what is to be written now."""
+        if not self._to_send:
+            return b""
         data = b"".join(self._to_send)
         self._to_send.clear()
         return data
@@ -200,11 +204,11 @@ class CompaxProtocol:
         """Read *data*, a piece of any size; see :meth:`events`."""
         # Flow control comes anywhere, in the middle of a prompt too.
         text = data.translate(None, NOT_TEXT)
-        if self._recognition.received(text) and self.state in BUSY & DOUBTFUL:
+        if self._recognition is not None and self._recognition.received(text) and self.state in BUSY & DOUBTFUL:
             self._notice(MarkerSpent())
         self._received += text
-        while (end := self._received.find(PROMPT)) >= 0:
-            self._recognition.prompt_came()
+        while PROMPT in self._received:
+            self._recognition = None
             self._read_number_after_prompt()
             end = self._received.find(PROMPT)
             token = bytes(self._received[: min(end, _MAX_TOKEN + 1)])
@@ -227,23 +231,24 @@ class CompaxProtocol:
 
     # Turns ----------------------------------------------------------------------------------------------------------
 
-    def _step(self, event: Event) -> None:
+    def _step(self, what: type[Event]) -> None:
         try:
-            self.state = TRANSITIONS[self.state, type(event)]
+            self.state = TRANSITIONS[self.state, what]
         except KeyError:
             raise LinkProtocolError(
-                f"{type(event).__name__} is not possible while {self.state.value}",
+                f"{what.__name__} is not possible while {self.state.value}",
                 sent=self._ledger.last.text if self._ledger.last else None,
                 hint="wait for the turn to be over",
             ) from None
 
     def _notice(self, event: Event) -> None:
-        self._step(event)
+        self._step(type(event))
         self._events.append(event)
 
     def _write(self, text: str, wire: bytes) -> None:
         self._ledger.note(text, wire)
-        self._recognition.sent(wire)
+        if self._recognition is not None:
+            self._recognition.sent(wire)
         self._to_send.append(wire)
 
     @property
@@ -284,10 +289,14 @@ class CompaxProtocol:
 
     def _read_token(self, raw: bytes) -> None:
         """Read what stood before one prompt: usually one line or none, after noise or an echo more."""
+        asked, text = self._outstanding, as_text(raw)
+        if asked is not None and (plain := PLAIN_ANSWER.fullmatch(text)) and plain.groups() == asked.key:
+            self._end_turn(Answered(text))  # so it is nearly always; all that follows would make the same of it
+            return
         if not raw:
             self._read_prompt()
             return
-        lines = [line.strip(" \t>") for line in re.split(r"[\r\n]+", as_text(self._without_frame(raw)))]
+        lines = [line.strip(" \t>") for line in LINE_ENDS.split(as_text(self._without_frame(raw)))]
         lines = [rest for line in lines if (rest := self._without_echo(line))]
         for line in lines[:-1]:
             self._read_unterminated(line)

@@ -15,10 +15,9 @@ _MAX_BYTES: Final = 512
 
 
 class Recognition:
-    """Compares what comes at first with what strangers say; the first prompt (CR LF >) ends that for good."""
+    """Compares what comes at first with what strangers say; with the first prompt (CR LF >) that is over for good."""
 
     def __init__(self) -> None:
-        self._is_compax = False
         self._sent = bytearray()
         self._received = bytearray()
 
@@ -27,27 +26,18 @@ class Recognition:
         self._sent.clear()
         self._received.clear()
 
-    def prompt_came(self) -> None:
-        """Take note that a prompt has come: only a COMPAX sends it."""
-        self._is_compax = True
-
     def sent(self, data: bytes) -> None:
         """Take note of what goes out."""
-        if not self._is_compax:
-            self._sent += data[: _MAX_BYTES - len(self._sent)]
+        self._sent += data[: _MAX_BYTES - len(self._sent)]
 
     def received(self, data: bytes) -> bool:
         """Read what came in; say whether a stranger has ended an answer with it."""
-        if self._is_compax:
-            return False
         before = self._answers()
         self._received += data[: _MAX_BYTES - len(self._received)]
         return self._answers() > before
 
     def stranger(self, *, time_is_over: bool) -> Stranger | None:
         """Say what it is; unless *time_is_over*, only what is certain."""
-        if self._is_compax:
-            return None
         found = next((row for row in STRANGERS if self._is_certain(row)), None)
         if found is None and time_is_over:
             found = next((row for row in STRANGERS if row.answers is None and self._count(row)), None)
