@@ -91,7 +91,7 @@ def _not_counted(what: str, why: str) -> Figure:
 async def _memory(client: str, port: int, count: int) -> tuple[float, float]:
     """Return how many bytes an exchange holds at most while it lasts, and how many blocks it leaves behind."""
     async with CLIENTS[client](HOST, port) as ask:
-        for _ in range(100):  # rings are filled, and what is made only once is made
+        for _ in range(count):  # rings are filled, and what is made only once is made
             await ask()
         gc.collect()
         before = sys.getallocatedblocks()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from .effort import FULL, LEAST, SHORT, Effort
 from .far_end_process import FarEnd, far_end, stay
-from .figures import Figure, Row, Target, at_least, at_most
+from .figures import Figure, Row, Target, above, at_least, at_most
 from .loops import LOOPS, fastest_loop
 from .machine import Machine, Noise
 from .rounds import Measured, Results, interleaved, interleaved_async
@@ -24,6 +24,7 @@ __all__ = [
     "Results",
     "Row",
     "Target",
+    "above",
     "at_least",
     "at_most",
     "far_end",

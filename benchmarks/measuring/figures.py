@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Literal
 
-__all__ = ["Figure", "Row", "Target", "at_least", "at_most"]
+__all__ = ["Figure", "Row", "Target", "above", "at_least", "at_most"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,7 +14,7 @@ class Target:
     """What a value should be, in the figure's own unit."""
 
     limit: float
-    kind: Literal["at most", "at least", "below"]
+    kind: Literal["at most", "at least", "above"]
     says: str = ""
     """Other words for it."""
 
@@ -22,11 +22,11 @@ class Target:
         """Whether *value* is as it should be."""
         if self.kind == "at least":
             return value >= self.limit
-        return value < self.limit if self.kind == "below" else value <= self.limit
+        return value > self.limit if self.kind == "above" else value <= self.limit
 
     def told(self, unit: str) -> str:
         """Say it: ``≤ 1.5 times the floor``."""
-        sign = {"at most": "≤", "at least": "≥", "below": "<"}[self.kind]
+        sign = {"at most": "≤", "at least": "≥", "above": ">"}[self.kind]
         return self.says or f"{sign} {self.limit:,g} {unit}".strip()
 
 
@@ -38,6 +38,11 @@ def at_most(limit: float, says: str = "") -> Target:
 def at_least(limit: float, says: str = "") -> Target:
     """Make a target that smaller values miss."""
     return Target(limit, "at least", says)
+
+
+def above(limit: float, says: str = "") -> Target:
+    """Make a target that values must be larger than."""
+    return Target(limit, "above", says)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
