@@ -741,6 +741,7 @@ PIECES_OF_ANSWERS: Final = [
     answer=st.lists(st.sampled_from([*PIECES_OF_ANSWERS, "\r", "\n", "END", "\xb2"]), max_size=7).map("".join),
 )
 @example(asked="S1", answer="S001: 5")
+@example(asked="S1", answer="S001: 5 ")
 @example(asked="S1", answer="S1S001: 5")
 def test_an_answer_as_it_nearly_always_is_is_read_as_any_other(asked: str, answer: str) -> None:
     at_once, at_length = waiting_for(asked), waiting_for(asked)
