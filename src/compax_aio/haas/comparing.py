@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
 from itertools import zip_longest
@@ -49,14 +49,15 @@ class Difference:
     """One number whose value differs."""
 
     number: int
+    """Of the datum; of the program, 0 if it has none."""
     name: str
-    """As far as the tables know it; else empty."""
+    """As far as the tables know it; else empty. Of a program its ``O`` and digits."""
     how: How
     before: str | None
-    """As text, without blanks; None if it is not there."""
+    """The value as text, without blanks; of a program, the block. None if it is not there."""
     after: str | None
     before_line: int | None
-    """From 1; None if it is not there."""
+    """In the file, from 1; None if it is not there."""
     after_line: int | None
 
     def __str__(self) -> str:
@@ -71,6 +72,23 @@ class Difference:
                 return f"{which}: is new, {self.after}"
             case How.MOVED:
                 return f"{which}: stood in line {self.before_line}, stands in line {self.after_line}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProgramDifference(Difference):
+    """The first block in which a program differs, or where one of the two ends."""
+
+    def __str__(self) -> str:
+        """Write ``O01234, line 7: 'G0X1' became 'G0X2' (line 8)``."""
+        which = self.name or "a program without a name"
+        match self.how:
+            case How.MISSING:
+                return f"{which}, line {self.before_line}: {shown(self.before)} is missing"
+            case How.ADDED:
+                return f"{which}: {shown(self.after)} is new (line {self.after_line})"
+            case _:
+                became = f"{shown(self.before)} became {shown(self.after)} (line {self.after_line})"
+                return f"{which}, line {self.before_line}: {became}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,14 +131,21 @@ def compare_data(before: DataFile, after: DataFile) -> Comparison:
     return Comparison(differences=(*found, *moved), checksums=(before.checksum, after.checksum))
 
 
-def diff(before: DataFile, after: DataFile) -> tuple[Difference, ...]:
+def diff(before: DataFile | ProgramFile, after: DataFile | ProgramFile) -> tuple[Difference, ...]:
     """
-    Return by number in what two files of the same kind differ; ``()`` if in nothing but N0, blanks and ends of lines.
+    Return in what two files differ; ``()`` if in nothing that matters.
+
+    Of numbered data each number that differs is told, see ``compare_data()``; of programs, by their numbers, the first
+    block in which each differs, see ``first_difference()``.
 
     Raises:
         InvalidCommandError: They are of different kinds.
     """
-    return compare_data(before, after).differences
+    if isinstance(before, ProgramFile) and isinstance(after, ProgramFile):
+        return tuple(_between_programs(before, after))
+    if isinstance(before, DataFile) and isinstance(after, DataFile):
+        return compare_data(before, after).differences
+    raise InvalidCommandError("programs and numbered data cannot be compared", hint="give two files of the same kind")
 
 
 _Key = tuple[int, int]
@@ -177,29 +202,6 @@ def _name_of(kind: DataKind, number: int) -> str:
 # Programs ------------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ProgramDifference:
-    """The first place at which two program files differ; None and 0 where one of them has ended."""
-
-    program: str
-    """The name of the program, as it was sent."""
-    sent_line: int
-    """From 1, in the file that was sent."""
-    received_line: int
-    sent: str | None
-    """The block."""
-    received: str | None
-
-    def __str__(self) -> str:
-        """Write ``O01234, line 7: 'G0X1' was sent, 'G0X2' came back (line 8)``."""
-        if self.sent is None:
-            return f"{self.program}: {shown(self.received)} came back (line {self.received_line}) and was never sent"
-        where = f"{self.program}, line {self.sent_line}: {shown(self.sent)} was sent"
-        if self.received is None:
-            return f"{where} and has not come back"
-        return f"{where}, {shown(self.received)} came back (line {self.received_line})"
-
-
 _COMMENT: Final = re.compile(rb"(\([^)]*\)?)")
 _NAME: Final = re.compile(rb"[Oo]0*(?=[0-9])")
 _BLANKS: Final = b" \t"
@@ -211,21 +213,18 @@ def first_difference(sent: ProgramFile | str | bytes, received: ProgramFile | st
 
     What a control writes in its own way does not count: ends of blocks, blanks between words (Setting 41), leading
     zeros of names, blank blocks at the ends of programs, what stands outside of the ``%`` lines. Comments count as
-    they are written, and so do blank blocks within: a control makes one of a semicolon.
+    they are written, and so do blank blocks within: a control makes one of a semicolon. Programs are found again by
+    their numbers.
 
     Raises:
         InvalidCommandError: A character of a text has no code of 8 bits.
 
     >>> print(first_difference(b"%\nO1234\nG0 X1\n%\n", b"\r\n%\r\nO01234\r\nG0X2\r\n%\r\n"))
-    O1234, line 3: 'G0 X1' was sent, 'G0X2' came back (line 4)
+    O1234, line 3: 'G0 X1' became 'G0X2' (line 4)
     """
     ours = sent if isinstance(sent, ProgramFile) else parse_program_file(sent)
     theirs = received if isinstance(received, ProgramFile) else parse_program_file(received)
-    for one, other in zip_longest(ours.programs, theirs.programs):
-        found = _first_in(one, other)
-        if found is not None:
-            return found
-    return None
+    return next(_between_programs(ours, theirs), None)
 
 
 def same_program(sent: ProgramFile | str | bytes, received: ProgramFile | str | bytes) -> bool:
@@ -233,18 +232,37 @@ def same_program(sent: ProgramFile | str | bytes, received: ProgramFile | str | 
     return first_difference(sent, received) is None
 
 
-def _first_in(sent: Program | None, received: Program | None) -> ProgramDifference | None:
-    ours, theirs = _blocks_of(sent), _blocks_of(received)
-    for one, other in zip_longest(ours, theirs):
+def _between_programs(before: ProgramFile, after: ProgramFile) -> Iterator[ProgramDifference]:
+    left, right = _programs_by_occurrence(before), _programs_by_occurrence(after)
+    for key in {**left, **right}:
+        found = _first_in(left.get(key), right.get(key))
+        if found is not None:
+            yield found
+
+
+def _programs_by_occurrence(file: ProgramFile) -> dict[tuple[str | int, int], Program]:
+    counts: Counter[str | int] = Counter()
+    found = {}
+    for each in file.programs:
+        key = each.number if each.number is not None else "" if each.name is None else each.name.text
+        found[key, counts[key]] = each
+        counts[key] += 1
+    return found
+
+
+def _first_in(before: Program | None, after: Program | None) -> ProgramDifference | None:
+    for one, other in zip_longest(_blocks_of(before), _blocks_of(after)):
         if one is not None and other is not None and (one.raw == other.raw or _bare(one) == _bare(other)):
             continue
-        named = sent if sent is not None else received
+        program = before or after
         return ProgramDifference(
-            program=str(named) if named is None or named.name is None else named.name.text,
-            sent_line=0 if one is None else one.line,
-            received_line=0 if other is None else other.line,
-            sent=None if one is None else one.text,
-            received=None if other is None else other.text,
+            number=(program.number if program else None) or 0,
+            name=program.name.text if program and program.name else "",
+            how=How.ADDED if one is None else How.MISSING if other is None else How.CHANGED,
+            before=None if one is None else one.text,
+            after=None if other is None else other.text,
+            before_line=None if one is None else one.line,
+            after_line=None if other is None else other.line,
         )
     return None
 
