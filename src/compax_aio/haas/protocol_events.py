@@ -11,6 +11,7 @@ __all__ = [
     "Answered",
     "CutShort",
     "HeldBack",
+    "LeftOver",
     "NobodyAnswers",
     "Overheard",
     "Printed",
@@ -82,6 +83,13 @@ class Overheard(Event):
     """A frame that answers nothing that was asked: somebody else asks on this line, or it came very late."""
 
     text: str
+
+
+@dataclass(frozen=True, slots=True)
+class LeftOver(Event):
+    """More of a file has come that was given up; it is dropped."""
+
+    bytes: int
 
 
 @dataclass(frozen=True, slots=True)

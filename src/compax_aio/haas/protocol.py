@@ -1,0 +1,482 @@
+"""
+A control's line, sans-IO: files go over it as their synchronisation has it, and one question at a time.
+
+To get in step nothing is sent, for a control that collects no data answers nothing, and files go over its line all the
+same: it is a pause, and when nothing has come in it, nothing is on its way. A question is sent only when the line has
+been silent for a moment, so not while a program prints; a control that was polled without pause has frozen.
+
+An answer that did not come in time is *owed*. Most answers name what they answer, but not all: ``STATUS, BUSY`` is one
+to anything. So while something is owed, the next question is preceded by another one whose answer cannot be mistaken;
+when that has come, what was owed is lost, for a control answers in order.
+
+A transfer is one turn. The bytes that come in it are the file's, and those of a late answer are taken out.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from ..errors import InvalidCommandError, LinkProtocolError
+from ..link.contract import Event, GoesOn, Hold, InStep, LateEnding, MarkerSpent, Stranger
+from ..link.level import LineLevel
+from .answers import Belongs, Request, belonging
+from .facts.characters import DC1, DC3, ETB, PROMPT, STX
+from .frames import Broken, Echo, Frame, FrameSplitter, Line, Outside, Part, PrintReader
+from .line_code import LineCode
+from .owed import OwedAnswers
+from .profiles import Profile
+from .protocol_events import (
+    Answered,
+    CutShort,
+    HeldBack,
+    LeftOver,
+    NobodyAnswers,
+    Overheard,
+    Printed,
+    ReaderOff,
+    ReaderOn,
+    TransferOver,
+    Unreadable,
+)
+from .protocol_states import BUSY, DOUBTFUL, TRANSITIONS, State, Step
+from .settings import ControlSettings
+from .transfers.account import Ending
+from .transfers.choosing import HELD_BY_SIGNS
+from .transfers.strategy import Strategy
+
+__all__ = ["HaasProtocol"]
+
+_MOST_WHILE_QUIETING_BYTES: Final = 4096
+"""So much comes in four seconds at 9600 baud: whatever it is, it does not end soon."""
+_MOST_PUT_OFFS: Final = 256
+"""And so often such a pause begins anew."""
+_SIGNS: Final = bytes((DC1, DC3))
+_SHOWN_BYTES: Final = 64
+_WITH_READER: Final = "dc codes"
+
+
+class HaasProtocol:
+    """
+    The host's end of a control's line.
+
+    Args:
+        profile: How the control is set up.
+        settings: How long things take.
+
+    Attributes:
+        level: What is known of the line that bytes go out on; set it before the line is opened.
+    """
+
+    def __init__(self, profile: Profile, settings: ControlSettings) -> None:
+        self.state = State.IN_DOUBT
+        self.level = LineLevel()
+        self._profile = profile
+        self._settings = settings
+        self._code = LineCode(profile)
+        self._splitter = FrameSplitter(profile.data_collection or "rs-232")
+        self._prints = PrintReader()
+        self._owed = OwedAnswers()
+        self._loaded: Strategy | None = None
+        self._strategy: Strategy | None = None
+        """Of the transfer that is the turn."""
+        self._request: Request | None = None
+        """What is to be asked, or is."""
+        self._probe: Request | None = None
+        """What is asked first, because something is owed."""
+        self._is_held = False
+        """Whether the control has told to send nothing (Xoff)."""
+        self._is_reader_on = False
+        """Whether it has told that it reads (DC1, with DC codes), and nothing was sent since."""
+        self._came_bytes = self._put_offs = 0
+        """In the pause, so far."""
+        self._babbles = False
+        """Whether something never stops coming."""
+        self._is_file_left = False
+        """Whether what comes is what is left of a file that is not wanted any more."""
+        self._to_send: list[bytes] = []
+        self._events: list[Event] = []
+
+    # What the link asks ---------------------------------------------------------------------------------------------
+
+    @property
+    def in_doubt(self) -> bool:
+        """Whether what comes next may belong to anything that was before."""
+        return self.state in DOUBTFUL
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether an answer, a file, or the end of a pause is awaited."""
+        return self.state in BUSY
+
+    @property
+    def patience_s(self) -> float | None:
+        """How long what is awaited may take; the bytes that must leave first have their time."""
+        settings = self._settings
+        if self.state is State.TRANSFERRING:
+            return self._transfer.pause_s
+        if self.state is State.QUIETING:
+            return settings.quiet_s
+        if self.state is State.CALMING:
+            return settings.silence_timeout_s if self._is_held else self._calm_s
+        return settings.answer_timeout_s + self.level.leaves_s(self._unwritten_bytes)
+
+    @property
+    def _calm_s(self) -> float:
+        """How long the line is silent before something is sent."""
+        is_file_in_doubt = self._strategy is not None and self._owed
+        return self._settings.quiet_s if is_file_in_doubt else self._settings.gap_s
+
+    @property
+    def held(self) -> Hold | None:
+        """Nothing: to get in step, nothing is sent."""
+        return None
+
+    def stranger(self, *, time_is_over: bool) -> Stranger | None:
+        """Say that something never stops sending."""
+        if not (time_is_over and self._babbles):
+            return None
+        return Stranger(
+            "a control that sends, and nobody has waited for it",
+            "wait until it is done, or press RESET at the control; if what comes is garbled, compare baud rate, parity "
+            "and data bits with its Settings 11, 12 and 37",
+        )
+
+    # What the link does ---------------------------------------------------------------------------------------------
+
+    def line_opened(self) -> None:
+        """Take note that the line is new: what is on its way is unknown."""
+        self._step(Step.LINE_OPENED)
+        self._begin_anew()
+
+    def line_lost(self) -> None:
+        """Give up what is outstanding: nobody will answer it."""
+        self._step(Step.LINE_LOST)
+        if self._strategy is not None:
+            self._strategy.line_lost()
+        self._begin_anew()
+
+    def _begin_anew(self) -> None:
+        self._strategy = self._request = self._probe = None
+        self._owed.clear()
+        self._splitter.give_up()
+        self._prints.give_up()
+        self._is_held = self._is_reader_on = self._babbles = self._is_file_left = False
+        self._to_send.clear()
+
+    def load(self, strategy: Strategy) -> None:
+        """Have *strategy* ready: sending its label begins it."""
+        self._loaded = strategy
+
+    def send(self, text: str) -> None:
+        """
+        Begin the transfer of that label, or ask the question that is its text.
+
+        Raises:
+            InvalidCommandError: It is neither.
+        """
+        if self._loaded is not None and text == self._loaded.label:
+            self._strategy, self._loaded = self._loaded, None
+            if self._strategy.sends or self._strategy.takes_all:
+                self._begin_pause(Step.SEND_BEGUN)
+            else:
+                self._begin_transfer()
+        else:
+            self._request = Request.sent_as(text)
+            self._begin_pause(Step.SEND_BEGUN)
+
+    def send_marker(self) -> None:
+        """Send nothing, for a while."""
+        self._begin_pause(Step.PAUSE_BEGUN)
+
+    def send_ahead(self, text: str) -> None:
+        """Send nothing either: there is no stop that a control heeds over this line."""
+        raise InvalidCommandError(f"{text!r} cannot be sent ahead: a control has no stop over this line")
+
+    def preempt(self, text: str) -> None:  # noqa: ARG002  # it is the outstanding turn that is meant
+        """Give up what is outstanding, a transfer as its synchronisation has it, and wait until the line is quiet."""
+        if self._strategy is not None:
+            self._strategy.give_up()
+            self._is_file_left |= self.state is State.TRANSFERRING and not self._strategy.sends
+            self._events.append(TransferOver(self._strategy.account()))
+            self._strategy = None
+        elif self._request is not None:
+            if self.state is State.ASKING:
+                self._owed.add(self._request)
+            elif self.state is State.CATCHING_UP:
+                self._owed.add(self._probed)
+            self._events.append(CutShort(self._request.text))
+        self._request = self._probe = None
+        self._begin_pause(Step.PREEMPTED)
+
+    def time_ran_out(self) -> None:
+        """Go on after a pause, or take note that what was awaited did not come."""
+        if self.state is State.TRANSFERRING:
+            self._transfer.time_ran_out()
+            self._note_transfer()
+        elif self.state is State.QUIETING:
+            self._get_in_step()
+        elif self.state is State.CALMING:
+            self._end_calm()
+        elif self.state is State.CATCHING_UP:
+            self._owed.add(self._probed)
+            self._events.append(NobodyAnswers(self._asked.text, self._probed.text))
+            self._end_request(Step.TIME_RAN_OUT)
+        else:
+            self._owed.add(self._asked)
+            self._end_request(Step.TIME_RAN_OUT)
+
+    def resume(self) -> None:
+        """Do nothing: the line is never held."""
+
+    def bytes_to_send(self) -> bytes:
+        """Take what is to be written now."""
+        data = b"".join(self._to_send)
+        self._to_send.clear()
+        return self._code.encode(data)
+
+    def receive(self, data: bytes) -> None:
+        """Read *data*, a piece of any size; see :meth:`events`."""
+        for piece, is_damaged in self._code.decode(data):
+            self._read(piece, is_damaged)
+
+    def events(self) -> list[Event]:
+        """Take what has been noticed since the last call, in order."""
+        events, self._events = self._events, []
+        return events
+
+    # Reading --------------------------------------------------------------------------------------------------------
+
+    def _read(self, data: bytes, is_damaged: bool) -> None:
+        if self.state is State.TRANSFERRING:
+            self._read_in_transfer(data, is_damaged)
+            return
+        if self._profile.synchronization in HELD_BY_SIGNS or self._profile.synchronization == _WITH_READER:
+            without_signs = data.translate(None, _SIGNS)
+            if len(without_signs) != len(data):
+                self._heed_signs(data)
+                is_damaged &= data[0] not in _SIGNS
+                data = without_signs
+        self._read_answers(data, is_damaged)
+        self._put_off_pause(len(data))
+
+    def _put_off_pause(self, came_bytes: int) -> None:
+        if not came_bytes or self.state not in {State.QUIETING, State.CALMING}:
+            return
+        self._came_bytes += came_bytes
+        self._put_offs += 1
+        if self._came_bytes <= _MOST_WHILE_QUIETING_BYTES and self._put_offs <= _MOST_PUT_OFFS:
+            if not (self.state is State.CALMING and self._is_held):
+                self._events.append(GoesOn())
+        elif self.state is State.QUIETING:
+            self._babbles = True
+            self._step(Step.BABBLED)
+            self._events.append(MarkerSpent())
+        else:
+            self._hold_back(by_xoff=False)
+
+    def _heed_signs(self, data: bytes) -> None:
+        """Heed DC1 and DC3, which may stand anywhere in what comes."""
+        for sign in data:
+            if sign not in _SIGNS:
+                continue
+            is_go = sign == DC1
+            if self._profile.synchronization == _WITH_READER:
+                self._is_reader_on = is_go
+                self._events.append(ReaderOn() if is_go else ReaderOff())
+            elif self._is_held is is_go:
+                self._is_held = not is_go
+                if self.state is State.CALMING:
+                    self._events.append(GoesOn())
+
+    def _read_answers(self, data: bytes, is_damaged: bool) -> None:
+        if is_damaged:
+            self._splitter.note_damage()
+        for part in self._splitter.feed(data):
+            if isinstance(part, Frame):
+                self._read_frame(part.text)
+            elif isinstance(part, Broken):
+                self._read_broken(part.data)
+            elif isinstance(part, Outside):
+                self._read_outside(part.data, part.is_damaged)
+
+    def _read_outside(self, data: bytes, is_damaged: bool) -> None:
+        if self._is_file_left:
+            self._events.append(LeftOver(len(data)))
+        else:
+            self._print(self._prints.feed(data, is_damaged=is_damaged))
+
+    def _print(self, lines: list[Line | Echo]) -> None:
+        for line in lines:
+            if isinstance(line, Line) and line.text.strip():
+                self._events.append(Printed(line.text, line.is_damaged))
+
+    def _read_frame(self, text: str) -> None:
+        self._print(self._prints.answer_begins())
+        if self.state is State.CATCHING_UP and belonging(self._probed, text) is Belongs.YES:
+            self._owed.clear()
+            self._probe = None
+            self._begin_pause(Step.CAUGHT_UP)
+            self._events.append(GoesOn())
+        elif self.state is State.ASKING and belonging(self._asked, text) in {Belongs.YES, Belongs.PERHAPS}:
+            self._events.append(Answered(text))
+            self._end_request(Step.ANSWERED)
+        elif (late := self._owed.take(text)) is not None:
+            self._events.append(LateEnding(late.text, Answered(text)))
+        elif self.state is State.ASKING and belonging(self._asked, text) is Belongs.UNKNOWN:
+            self._fail(text)
+        else:
+            self._events.append(Overheard(text))
+
+    def _read_broken(self, data: bytes) -> None:
+        text = data[:_SHOWN_BYTES].decode("latin-1")
+        if self.state is State.ASKING:
+            self._fail(text)
+        else:
+            self._events.append(Overheard(text))
+
+    def _fail(self, text: str) -> None:
+        """Take note of an answer that cannot be read; another one may still come."""
+        self._owed.add(self._asked)
+        self._events.append(Unreadable(self._asked.text, text[:_SHOWN_BYTES]))
+        self._end_request(Step.UNREADABLE)
+
+    def _end_request(self, step: Step) -> None:
+        self._step(step)
+        self._request = self._probe = None
+
+    @property
+    def _asked(self) -> Request:
+        assert self._request is not None  # there is one in every state in which something is asked
+        return self._request
+
+    @property
+    def _probed(self) -> Request:
+        assert self._probe is not None  # the same
+        return self._probe
+
+    # Pauses ---------------------------------------------------------------------------------------------------------
+
+    def _forget_begun(self) -> None:
+        """Expect no more of an answer of which only the beginning has come."""
+        for part in self._splitter.give_up():
+            if isinstance(part, Broken):
+                self._read_broken(part.data)
+
+    def _get_in_step(self) -> None:
+        self._forget_begun()
+        self._print(self._prints.give_up())
+        self._babbles = self._is_file_left = False
+        self._step(Step.QUIET)
+        self._events.append(InStep())
+
+    def _begin_pause(self, step: Step) -> None:
+        self._step(step)
+        self._came_bytes = self._put_offs = 0
+
+    def _end_calm(self) -> None:
+        self._forget_begun()
+        if self._is_held:
+            self._hold_back(by_xoff=True)
+        elif self._strategy is not None:
+            self._begin_transfer()
+        elif self._owed:
+            self._probe = self._owed.probe()
+            self._step(Step.PROBE_SENT)
+            self._ask(self._probe)
+        else:
+            self._step(Step.QUERY_SENT)
+            self._ask(self._asked)
+
+    def _ask(self, request: Request) -> None:
+        self._prints.expect_echo(self._profile.request_prefix + request.text)
+        self._write((self._profile.request_prefix + request.text + self._profile.request_end).encode("ascii"))
+
+    def _hold_back(self, *, by_xoff: bool) -> None:
+        """Send nothing of what was to be sent; the next one is sent all the same, for an Xon may be lost."""
+        sent = self._strategy.label if self._strategy is not None else self._asked.text
+        self._strategy = None
+        self._is_held = False
+        self._events.append(HeldBack(sent, by_xoff))
+        self._end_request(Step.HELD_BACK)
+
+    # Transfers ------------------------------------------------------------------------------------------------------
+
+    @property
+    def _transfer(self) -> Strategy:
+        assert self._strategy is not None  # there is one in the state that has one
+        return self._strategy
+
+    def _begin_transfer(self) -> None:
+        is_reader_on, self._is_reader_on = self._is_reader_on, False
+        self._step(Step.TRANSFER_BEGUN)
+        level = LineLevel(self.level.bytes_per_s, lambda: self.level.unsent() + self._unwritten_bytes)
+        self._transfer.begin(level, self._write, reader_is_on=is_reader_on)
+
+    def _read_in_transfer(self, data: bytes, is_damaged: bool) -> None:
+        strategy = self._transfer
+        while data and self._may_answer(strategy):
+            if is_damaged:
+                self._splitter.note_damage()
+            end = _behind_answer(data)
+            for part in self._splitter.feed(data[:end]):
+                self._read_part_in_transfer(strategy, part)
+            data, is_damaged = data[end:], False
+        if data:
+            if is_damaged:
+                strategy.note_damage()
+            if foreign := strategy.receive(data):
+                self._read_answers(foreign, False)
+        self._note_transfer()
+
+    def _may_answer(self, strategy: Strategy) -> bool:
+        """Whether what comes next may belong to an answer, although a file is on its way."""
+        return not strategy.takes_all and (strategy.sends or bool(self._owed) or self._splitter.awaits_prompt)
+
+    def _read_part_in_transfer(self, strategy: Strategy, part: Part) -> None:
+        if isinstance(part, Frame):
+            self._read_frame(part.text)
+        elif isinstance(part, Outside):
+            self._feed(strategy, part.data, part.is_damaged)
+        elif isinstance(part, Broken):  # what began like an answer and is none was the file's
+            self._feed(strategy, bytes((STX,)) + part.data, is_damaged=True)
+
+    def _feed(self, strategy: Strategy, data: bytes, is_damaged: bool) -> None:
+        if is_damaged:
+            strategy.note_damage()
+        if foreign := strategy.receive(data):
+            self._read_outside(foreign, is_damaged)
+
+    def _note_transfer(self) -> None:
+        strategy = self._transfer
+        self._events += strategy.take_notes()
+        if strategy.ending is None:
+            if strategy.take_moved():
+                self._events.append(GoesOn())
+            return
+        is_whole = strategy.ending is Ending.COMPLETE
+        self._strategy = None
+        self._splitter.give_up()
+        self._is_file_left = not (is_whole or strategy.sends)
+        self._events.append(TransferOver(strategy.account()))
+        self._step(Step.TRANSFER_OVER if is_whole else Step.TRANSFER_BROKEN)
+
+    # Small things ---------------------------------------------------------------------------------------------------
+
+    def _write(self, data: bytes) -> None:
+        self._to_send.append(data)
+
+    @property
+    def _unwritten_bytes(self) -> int:
+        return sum(map(len, self._to_send))
+
+    def _step(self, step: Step) -> None:
+        try:
+            self.state = TRANSITIONS[self.state, step]
+        except KeyError:
+            raise LinkProtocolError(f"{step.value} while {self.state.value}") from None
+
+
+def _behind_answer(data: bytes) -> int:
+    """Return the place behind the first sign that can end an answer."""
+    ends = [at + 1 for sign in (ETB, PROMPT) if (at := data.find(sign)) >= 0]
+    return min(ends, default=len(data))
