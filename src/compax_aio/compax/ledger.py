@@ -23,7 +23,7 @@ _TEXTS_KNOWN: Final = 1024
 _QUERY: Final = re.compile(r"([SPVN])0*(\d{1,3})")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(slots=True, eq=False)
 class Sent:
     """A line that was sent, and what its answer looks like."""
 
@@ -32,11 +32,6 @@ class Sent:
     """As it went out."""
     key: tuple[str, str] | None
     """Letter and number that a query's answer begins with; None for a command."""
-
-    @classmethod
-    def of(cls, text: str, wire: bytes) -> Sent:
-        """Take note of *text*, which went out as *wire*."""
-        return cls(text, wire, _key(text))
 
     @property
     def wants_message(self) -> bool:
@@ -93,7 +88,7 @@ class Ledger:
         """Take note of a line that was sent."""
         if len(self._lines) >= _MAX_LEDGER:
             self._forget_oldest()
-        self._add(Sent.of(text, wire))
+        self._add(Sent(text, wire, _key(text)))
 
     def settle(self) -> None:
         """Forget all: it is answered, refused or lost."""

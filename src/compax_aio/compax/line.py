@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Coroutine
 from math import inf
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from ..errors import AnswerTimeoutError, CommandRejectedError, ConnectionLostError, UnexpectedAnswerError
 from ..link.contract import Event, Lane, TurnOver
@@ -80,8 +80,13 @@ class DriveLine:
             UnexpectedAnswerError: It acknowledged a question instead of answering it.
             AnswerTimeoutError, ConnectionLostError: No answer came.
         """
+        return self._answer(text, await self._ask(text, lane))
+
+    def _ask(self, text: str, lane: Lane) -> asyncio.Future[TurnOver]:
         # What is asked in order to move does not wait for a line: a person who plugs in a cable expects no motion.
-        outcome = await self.link.exchange(text, lane, survives_loss=lane is not Lane.MOTION)
+        return self.link.exchange(text, lane, survives_loss=lane is not Lane.MOTION)
+
+    def _answer(self, text: str, outcome: TurnOver) -> str:
         if isinstance(outcome, Answered):
             return outcome.text
         raise self.error_of(text, outcome)
@@ -128,15 +133,15 @@ class DriveLine:
 
     async def read(self, text: str, decode: Callable[[str], _Value], lane: Lane = Lane.READ) -> _Value:
         """Ask, and decode the answer; an answer that cannot be decoded is told with the drive and its exchanges."""
-        return self._decoded(decode, await self.query(text, lane))
+        return self._decoded(decode, self._answer(text, await self._ask(text, lane)))
 
-    async def number(self, number: int, lane: Lane = Lane.READ) -> float:
+    def number(self, number: int, lane: Lane = Lane.READ) -> Coroutine[Any, Any, float]:
         """Read the status value ``S<number>``; see :meth:`query` for errors."""
-        return await self.read(f"S{number}", decode_number, lane)
+        return self.read(f"S{number}", decode_number, lane)
 
     async def position(self, lane: Lane = Lane.READ) -> float:
         """Read S1, the actual position (UG p. 104), and remember it."""
-        self.last_position = await self.number(1, lane)
+        self.last_position = await self.read("S1", decode_number, lane)
         return self.last_position
 
     async def status(self, lane: Lane = Lane.READ) -> DriveStatus:

@@ -96,7 +96,7 @@ class CompaxProtocol:
         """None once a prompt has come: only a COMPAX sends it."""
         self._motion_frame = ""
         self._stops_answered = 0
-        self._received = bytearray()
+        self._received = b""
         self._to_send: list[bytes] = []
         self._events: list[Event] = []
         self._number_may_follow = False
@@ -139,7 +139,7 @@ class CompaxProtocol:
 
     def line_opened(self) -> None:
         """Take note that the line is new; what stands in the drive's buffer is unknown, or known to be dangerous."""
-        self._received.clear()
+        self._received = b""
         self._to_send.clear()
         self._flood = ""
         self._number_may_follow = False
@@ -206,23 +206,20 @@ class CompaxProtocol:
         text = data.translate(None, NOT_TEXT)
         if self._recognition is not None and self._recognition.received(text) and self.state in BUSY & DOUBTFUL:
             self._notice(MarkerSpent())
-        self._received += text
-        while PROMPT in self._received:
+        received, begin = self._received + text, 0
+        while True:
+            if self._number_may_follow and len(received) > begin:
+                begin += self._read_number_after_prompt(received[begin : begin + 1])
+            end = received.find(PROMPT, begin)
+            if end < 0:
+                break
             self._recognition = None
-            self._read_number_after_prompt()
-            end = self._received.find(PROMPT)
-            token = bytes(self._received[: min(end, _MAX_TOKEN + 1)])
-            del self._received[: end + len(PROMPT)]
-            if len(token) > _MAX_TOKEN:
-                self._begin_flood(token)
-            if self._flood:
-                self._end_flood()
-            else:
-                self._read_token(token)
-        self._read_number_after_prompt()
+            self._read_token(received[begin:end])
+            begin = end + len(PROMPT)
+        self._received = received[begin:]
         if len(self._received) > _MAX_TOKEN + len(PROMPT) - 1:
-            self._begin_flood(bytes(self._received))
-            del self._received[: 1 - len(PROMPT)]
+            self._begin_flood(self._received)
+            self._received = self._received[1 - len(PROMPT) :]
 
     def events(self) -> list[Event]:
         """Take what has been noticed since the last call, in order."""
@@ -267,13 +264,19 @@ class CompaxProtocol:
 
     # Reading --------------------------------------------------------------------------------------------------------
 
-    def _read_number_after_prompt(self) -> None:
-        """Read the comparator number that may follow a prompt nobody waited for (the running text of UG p. 162)."""
-        if self._number_may_follow and self._received:
-            self._number_may_follow = False
-            if number := COMPARATOR.match(self._received[:1].decode("latin-1")):
-                del self._received[:1]
-                self._notice(ComparatorReached(int(number[0])))
+    def _read_number_after_prompt(self, sign: bytes) -> int:
+        """
+        Read the comparator number that may follow a prompt nobody waited for (the running text of UG p. 162).
+
+        Returns:
+            How many bytes it has: 1, or 0 if *sign* is none.
+        """
+        self._number_may_follow = False
+        number = COMPARATOR.match(as_text(sign))
+        if number is None:
+            return 0
+        self._notice(ComparatorReached(int(number[0])))
+        return len(sign)
 
     def _begin_flood(self, data: bytes) -> None:
         """Note that more has come than any answer has; once, until the next prompt."""
@@ -289,14 +292,21 @@ class CompaxProtocol:
 
     def _read_token(self, raw: bytes) -> None:
         """Read what stood before one prompt: usually one line or none, after noise or an echo more."""
+        if len(raw) > _MAX_TOKEN:
+            self._begin_flood(raw)
+        if self._flood:
+            self._end_flood()
+            return
         asked, text = self._outstanding, as_text(raw)
         if asked is not None and (plain := PLAIN_ANSWER.fullmatch(text)) and plain.groups() == asked.key:
             self._end_turn(Answered(text))  # so it is nearly always; all that follows would make the same of it
-            return
-        if not raw:
+        elif raw:
+            self._read_lines(as_text(self._without_frame(raw)))
+        else:
             self._read_prompt()
-            return
-        lines = [line.strip(" \t>") for line in LINE_ENDS.split(as_text(self._without_frame(raw)))]
+
+    def _read_lines(self, text: str) -> None:
+        lines = [line.strip(" \t>") for line in LINE_ENDS.split(text)]
         lines = [rest for line in lines if (rest := self._without_echo(line))]
         for line in lines[:-1]:
             self._read_unterminated(line)

@@ -262,7 +262,7 @@ class Link(asyncio.Protocol):
             cancelling it takes the line from the queue, or drops its answer when it is on the wire.
         """
         waiter: asyncio.Future[TurnOver] = self._loop.create_future()
-        survives_loss &= lane is not Lane.GREETING
+        survives_loss = survives_loss and lane is not Lane.GREETING
         attempt, now = self._attempts.count, self._loop.time()
         exchange = Exchange(text, lane, settles_late, survives_loss, attempt, now, on_sent, party, [waiter])
         if self._telling.is_heard:
@@ -271,16 +271,15 @@ class Link(asyncio.Protocol):
             if lane is Lane.STOP:
                 self._turns.say_ahead(exchange)  # it may be heard, although nothing comes back
             self._renew(self._silence.error)
-        if not self._takes(exchange):
+        if self._takes(exchange):
+            self._turns.put(exchange)
+        else:
             waiter.set_exception(self._lost(exchange))
-            return waiter
-        self._turns.put(exchange)
         return waiter
 
     def _takes(self, exchange: Exchange) -> bool:
-        if self.is_over or self._port.is_there:
-            return not self.is_over
-        return exchange.survives_loss and self._reconnecting is not None
+        waits_for_line = exchange.survives_loss and self._reconnecting is not None
+        return not self.is_over and (waits_for_line or self._port.is_there)
 
     def preempt(self, text: str) -> asyncio.Future[None]:
         """

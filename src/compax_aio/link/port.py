@@ -126,7 +126,9 @@ class Port:
     def in_pieces(self, data: bytes, read: Callable[[bytes], None]) -> None:
         """Hand *data* to *read*: the first piece at once, each other a while later, before more is taken."""
         if len(data) <= _PIECE_BYTES and not self._unread:
-            self._read(data, read)
+            if self._telling.is_heard:
+                self._telling.tell(Received(data))
+            read(data)
             return
         is_at_it = bool(self._unread)
         self._unread += data
@@ -141,14 +143,11 @@ class Port:
         del self._unread[:_PIECE_BYTES]
         if self._unread:
             self._loop.call_later(_BETWEEN_PIECES_S, self._read_piece, transport, read)
-        self._read(piece, read)
-        if not self._unread and transport is self._transport:
-            transport.resume_reading()
-
-    def _read(self, piece: bytes, read: Callable[[bytes], None]) -> None:
         if self._telling.is_heard:
             self._telling.tell(Received(piece))
         read(piece)
+        if not self._unread and transport is self._transport:
+            transport.resume_reading()
 
     def hang_up(self) -> None:
         """Let go of the transport at once; it reports its end soon."""
