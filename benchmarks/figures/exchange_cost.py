@@ -26,12 +26,13 @@ from compax_aio.transports import TransportURL, open_transport
 from ..far_ends.canned import HOST
 from ..measuring import LOOPS, Effort, FarEnd, Figure, Measured, Results, Row, at_most, far_end, interleaved_async
 from ..measuring.exchanges import CPU_US, WALL_US, a_round_async
-from ..measuring.floor import LINE, PROMPT, Bare
+from ..measuring.floor import LINE, PROMPT, Bare, Least
 
 __all__ = ["FLOOR", "MEDIA", "OURS", "measure"]
 
 FLOOR: Final = "floor: bare asyncio.Protocol"
 PYSERIAL_FLOOR: Final = "the same on pyserial-asyncio's own transport"
+LEAST: Final = "the least: a turn, a time-out, the right answer, a number"
 LINK: Final = "Link.exchange()"
 QUERY: Final = "drive.query()"
 OURS: Final = "drive.position()"
@@ -50,6 +51,16 @@ async def _bare(url: str) -> AsyncIterator[Ask]:
     transport = await open_transport(TransportURL.parse(url), lambda: protocol)
     try:
         yield protocol.ask
+    finally:
+        transport.close()
+
+
+@asynccontextmanager
+async def _least(url: str) -> AsyncIterator[Ask]:
+    protocol = Least()
+    transport = await open_transport(TransportURL.parse(url), lambda: protocol)
+    try:
+        yield protocol.position
     finally:
         transport.close()
 
@@ -94,7 +105,7 @@ async def _position(url: str) -> AsyncIterator[Ask]:
         yield drive.position
 
 
-_STEPS: Final = {FLOOR: _bare, LINK: _link, QUERY: _query, OURS: _position}
+_STEPS: Final = {FLOOR: _bare, LEAST: _least, LINK: _link, QUERY: _query, OURS: _position}
 _ON: Final = {"TCP": _STEPS, "pty": {FLOOR: _bare, PYSERIAL_FLOOR: _bare_on_pyserial, **_STEPS}}
 
 

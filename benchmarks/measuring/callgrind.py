@@ -7,15 +7,16 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final
 
-__all__ = ["Counted", "count_runs", "is_installed", "read_part"]
+__all__ = ["Counted", "count_runs", "count_whole", "is_installed", "read_part"]
 
 _MARK: Final = "getppid"
+_OUT: Final = "counted"
 _TIME_LIMIT_S: Final = 600.0
 _ALLOCATORS: Final = frozenset(
     {"_PyObject_Malloc", "_PyObject_Calloc", "_PyMem_RawMalloc", "_PyMem_RawCalloc", "_PyMem_MiRawMalloc"}
@@ -65,9 +66,23 @@ def read_part(text: str) -> Counted:
 
 def _parts(folder: Path) -> Iterator[Counted]:
     """Read what lies between the marks: the second part and those that follow it, but for the one after the last."""
-    numbered = {int(path.suffix[1:]): path for path in folder.glob("counted.*") if path.suffix[1:].isdigit()}
+    numbered = {int(path.suffix[1:]): path for path in folder.glob(f"{_OUT}.*") if path.suffix[1:].isdigit()}
     for number in sorted(numbered)[1:]:
         yield read_part(numbered[number].read_text(errors="replace"))
+
+
+def _valgrind(
+    folder: Path, options: Sequence[str], arguments: Sequence[str], environment: Mapping[str, str] = os.environ
+) -> None:
+    out = f"--callgrind-out-file={folder / _OUT}"
+    command = ["valgrind", "--tool=callgrind", out, *options, sys.executable, *arguments]
+    # Where hashes differ from run to run, so do the ways through dictionaries.
+    environment = {**environment, "PYTHONHASHSEED": "0"}
+    try:
+        subprocess.run(command, env=environment, check=True, capture_output=True, timeout=_TIME_LIMIT_S)
+    except (subprocess.CalledProcessError, subprocess.TimeoutExpired) as error:
+        said = (error.stderr or b"").decode(errors="replace")[-2000:]
+        raise RuntimeError(f"counting python {' '.join(arguments)} failed: {error}\n{said}") from error
 
 
 def count_runs(module: str, arguments: Sequence[str]) -> list[Counted]:
@@ -78,22 +93,12 @@ def count_runs(module: str, arguments: Sequence[str]) -> list[Counted]:
         RuntimeError: The run failed, or has not come to an end within ten minutes.
     """
     with TemporaryDirectory(prefix="counted-") as name:
-        folder = Path(name)
-        command = [
-            "valgrind",
-            "--tool=callgrind",
-            f"--callgrind-out-file={folder / 'counted'}",
-            f"--dump-before={_MARK}",
-            sys.executable,
-            "-m",
-            module,
-            *arguments,
-        ]
-        # Where hashes differ from run to run, so do the ways through dictionaries.
-        environment = {**os.environ, "PYTHONHASHSEED": "0"}
-        try:
-            subprocess.run(command, env=environment, check=True, capture_output=True, timeout=_TIME_LIMIT_S)
-        except (subprocess.CalledProcessError, subprocess.TimeoutExpired) as error:
-            said = (error.stderr or b"").decode(errors="replace")[-2000:]
-            raise RuntimeError(f"counting {module} failed: {error}\n{said}") from error
-        return list(_parts(folder))
+        _valgrind(Path(name), [f"--dump-before={_MARK}"], ["-m", module, *arguments])
+        return list(_parts(Path(name)))
+
+
+def count_whole(arguments: Sequence[str], environment: Mapping[str, str] = os.environ) -> Counted:
+    """Run ``python arguments…`` and return what all of it took; raises as :func:`count_runs` does."""
+    with TemporaryDirectory(prefix="counted-") as name:
+        _valgrind(Path(name), [], arguments, environment)
+        return read_part((Path(name) / _OUT).read_text(errors="replace"))
