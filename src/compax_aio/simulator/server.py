@@ -18,12 +18,15 @@ from .camm1.cutter import SimulatedCutter
 from .camm1.knobs import Knobs as CutterKnobs
 from .compax.drive import SimulatedDrive
 from .compax.knobs import Knobs
+from .haas.control import SimulatedControl
+from .haas.knobs import Knobs as ControlKnobs
 from .line import Connection, DeviceLine, SimulatedDevice
 from .smc.knobs import Knobs as LineKnobs
 from .smc.line import SimulatedPartyLine
 from .state_file import write_state_file
 
 __all__ = [
+    "control_named",
     "cutter_named",
     "drive_named",
     "kept",
@@ -41,7 +44,7 @@ _NAME: Final = "name"
 _LAST_PORT: Final = 65_535
 
 _File = str | os.PathLike[str]
-_T = TypeVar("_T", SimulatedDrive, SimulatedPartyLine, SimulatedCutter)
+_T = TypeVar("_T", SimulatedDrive, SimulatedPartyLine, SimulatedCutter, SimulatedControl)
 
 
 @runtime_checkable
@@ -60,9 +63,9 @@ class _Lasting(Protocol):
 
 async def open_simulator(url: TransportURL, protocol_factory: ProtocolFactory) -> asyncio.Transport:
     """
-    Open ``sim://compax?<knobs>``, ``sim://smc?…`` or ``sim://camm1?…``: a simulated device in this process.
+    Open ``sim://compax?<knobs>``, ``sim://smc?…``, ``sim://camm1?…`` or ``sim://haas?…``: a simulated device.
 
-    Each knob is an option.
+    It lives in this process. Each knob is an option.
 
     With ``name=`` all URLs of that name in one event loop are the same device, which lives on between connections;
     without it each connection gets a new one.
@@ -127,6 +130,20 @@ def cutter_named(name: str, knobs: CutterKnobs | None = None) -> SimulatedCutter
         TransportError: The cutter exists and has other knobs, or a device of another kind has that name.
     """
     return _named(SimulatedCutter, name, knobs)
+
+
+def control_named(name: str, knobs: ControlKnobs | None = None) -> SimulatedControl:
+    """
+    Return the control that ``sim://haas?name=...`` opens in the running event loop; it is made if there is none.
+
+    Args:
+        name: Any text.
+        knobs: What the control must be like; None: the default for a new one, and anything for one that exists.
+
+    Raises:
+        TransportError: The control exists and has other knobs, or a device of another kind has that name.
+    """
+    return _named(SimulatedControl, name, knobs)
 
 
 @asynccontextmanager
@@ -350,10 +367,16 @@ def _camm1(query: Mapping[str, str], name: str | None) -> SimulatedCutter:
     return SimulatedCutter(knobs) if name is None else cutter_named(name, knobs if query else None)
 
 
+def _haas(query: Mapping[str, str], name: str | None) -> SimulatedControl:
+    knobs = ControlKnobs.from_query(query)
+    return SimulatedControl(knobs) if name is None else control_named(name, knobs if query else None)
+
+
 _KINDS: Final[Mapping[str, Callable[[Mapping[str, str], str | None], SimulatedDevice]]] = {
     "compax": _compax,
     "smc": _smc,
     "camm1": _camm1,
+    "haas": _haas,
 }
 
 _devices: dict[asyncio.AbstractEventLoop, dict[str, Any]] = {}
