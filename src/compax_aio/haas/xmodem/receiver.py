@@ -27,6 +27,7 @@ _MOST_NOISE_BYTES: Final = 2 * FRAME_BYTES
 """So much that is no block is thrown away at a time; then it counts as one that was damaged."""
 _MOST_STRAY_BYTES: Final = 16
 """Noise is that short, and so is an EOT that was damaged; more is a block of which the rest was lost."""
+_MOST_DOUBTFUL: Final = 100
 _LINE_FEED_ONLY: Final = b"\n"
 
 
@@ -76,13 +77,16 @@ class XmodemReceiver:
         repeats: Blocks that came again after they had been received.
         naks: Sent, the ones before the first block included.
         damaged: Blocks, or what was left of them, that came and could not be read.
-        strays: Bytes that belonged to no block. If there are any and none was damaged, a look at the file is wise.
+        strays: Bytes that belonged to no block.
+        doubtful_blocks: Numbers of blocks, counted from 1, behind which a byte too many stood: a byte of them came
+            twice, perhaps, and the sum happened to fit. The first hundred.
         sums_as_line_feed: Whether sums were computed as if each end of block were LF; None until a block has shown it.
         failure: Why it is over without success; None otherwise.
     """
 
     def __init__(self, times: ReceiverTimes | None = None, *, eob: bytes = _LINE_FEED_ONLY) -> None:
         self.blocks = self.repeats = self.naks = self.damaged = self.strays = 0
+        self.doubtful_blocks: list[int] = []
         self.failure: Failure | None = None
         self._times = times or ReceiverTimes()
         self._eob = eob
@@ -214,13 +218,15 @@ class XmodemReceiver:
 
     def _take_block(self, frame: bytes) -> bytes:
         data = frame[_DATA]
-        if not self._is_sum_of(data, frame[-1]):
+        if not self._is_sum_of(data, frame[-1]) or self._is_something_behind:
             self._noise += frame
             self._state = _State.IN_BLOCK
             return b""
-        self.strays += len(self._noise)
+        stray = bytes(self._noise)
+        self.strays += len(stray)
         self._noise.clear()
         if frame[1] == (self.blocks + 1) & 0xFF:
+            self._doubt_last(len(stray))
             self.blocks += 1
             self._last = data
             self._put_out(data)
@@ -234,6 +240,17 @@ class XmodemReceiver:
         self._retries = self._unread = 0
         self._state = _State.WAITING
         return bytes([ACK])
+
+    @property
+    def _is_something_behind(self) -> bool:
+        """Whether bytes are there that belong neither to the block nor begin what may follow: one is too many."""
+        behind = self._held
+        return bool(behind) and not has_header(behind) and behind[0] not in {EOT, CAN}
+
+    def _doubt_last(self, stray_bytes: int) -> None:
+        is_first_answer = not self._retries and self.blocks
+        if stray_bytes and is_first_answer and len(self.doubtful_blocks) < _MOST_DOUBTFUL:
+            self.doubtful_blocks.append(self.blocks)
 
     def _is_sum_of(self, data: bytes, told: int) -> bool:
         is_plain = checksum(data) == told
@@ -265,6 +282,7 @@ class XmodemReceiver:
             return self._cancelled_there()
         if len(thrown) <= _MOST_STRAY_BYTES:
             self.strays += len(thrown)
+            self._doubt_last(len(thrown) if thrown.endswith(_END) and len(thrown) > 1 else 0)
             if not self.blocks and not self._retries:
                 return self._ask_for_first()
         else:
