@@ -17,7 +17,7 @@ DEFAULT = ControlSettings()
 def test_every_wait_is_finite_by_default() -> None:
     times = [getattr(DEFAULT, each.name) for each in fields(DEFAULT) if each.name.endswith("_s")]
     assert len(times) >= 14
-    assert all(0 < each <= 120 for each in times)
+    assert all(0 < each <= 3600 for each in times)
 
 
 @pytest.mark.parametrize("value", [0, -1.0, inf, nan, "1", True, None])

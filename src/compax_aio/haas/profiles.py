@@ -58,6 +58,8 @@ class Profile:
         parity: Setting 12.
         stop_bits: Setting 13.
         synchronization: Setting 14; None: no files go over this line.
+        sends_xon: Whether with Xon/Xoff the control sends Xon when RECV is pressed: it is waited for then. With DC
+            codes and XMODEM it says by itself when it is ready; otherwise nobody does, and the operator is asked.
         eob: Setting 25; what this end sends. What comes may end its blocks in any way.
         data_bits: Setting 37.
         add_spaces: Setting 41: whether words of a block come with spaces between them.
@@ -78,6 +80,7 @@ class Profile:
     parity: Parity | None = None
     stop_bits: int | None = None
     synchronization: Synchronization | None = None
+    sends_xon: bool = False
     eob: EndOfBlock = "cr lf"
     data_bits: int | None = None
     add_spaces: bool | None = None
@@ -115,6 +118,11 @@ class Profile:
                 "data collection over Ethernet has no synchronization (Setting 14): no files go over that connection",
                 hint="connect to the serial port and to the network separately, with a profile for each",
             )
+
+    @property
+    def says_when_ready(self) -> bool:
+        """Whether the control tells this end that RECV was pressed."""
+        return self.synchronization in ("dc codes", "xmodem") or (self.synchronization == "xon/xoff" and self.sends_xon)
 
     @property
     def eob_bytes(self) -> bytes:
@@ -168,6 +176,7 @@ _EXPECTED: Final[Mapping[str, _Expected]] = {
     "parity": _one_of(*get_args(Parity)),
     "stop_bits": _one_of(1, 2),
     "synchronization": _one_of(*get_args(Synchronization)),
+    "sends_xon": _one_of(True, False, or_unknown=False),
     "eob": _one_of(*get_args(EndOfBlock), or_unknown=False),
     "data_bits": _one_of(7, 8),
     "add_spaces": _one_of(True, False),

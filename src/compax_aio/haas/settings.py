@@ -38,6 +38,8 @@ class ControlSettings:
     """After the last ``%`` nothing must come for so long: with that a file is whole that no DC4 ends …"""
     reader_off_timeout_s: float = 5.0
     """… and so long the control may take to say that it has read the last ``%`` (DC3, with DC codes)."""
+    drip_held_timeout_s: float = 3600.0
+    """For so long the control may hold a drip feed: a block under way may take long, and so may a feed hold."""
     block_timeout_s: float = 10.0
     """How long a block of XMODEM, or its acknowledgement, may take before it is asked for, or sent, again …"""
     most_blocks_repeated: int = 10

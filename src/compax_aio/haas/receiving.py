@@ -1,0 +1,177 @@
+"""A file received: listened for, kept on disk while it comes, looked at for damage and for being what was asked for."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Final
+
+from ..errors import InvalidCommandError
+from ..motion.events import DriveEvent
+from ..severity import Severity
+from .archive import Archive
+from .checking import check_data_file
+from .facts.data_files import DataKind
+from .language.data_file import DataFile, parse_data_file
+from .language.program_file import ProgramFile, parse_program_file
+from .line import ControlLine
+from .manners import ReceivingManner
+from .profiles import Profile
+from .transfer import Damage, Kind, Received
+from .transferring import Transferring
+from .transfers.account import LineAccount
+from .verifying import Verified, verified_received
+
+__all__ = ["Receiving", "read_file"]
+
+_AGAIN: Final = " once more, to be compared"
+
+
+class Receiving(Transferring[Received]):
+    """
+    Receives one file.
+
+    Args:
+        line: Of the control.
+        kind: What is expected.
+        manner: How it is wanted.
+        publish: Is told what happens.
+
+    Raises:
+        InvalidCommandError: The archive can be no path.
+    """
+
+    def __init__(
+        self,
+        line: ControlLine,
+        kind: Kind,
+        manner: ReceivingManner,
+        publish: Callable[[DriveEvent], None],
+    ) -> None:
+        archive = None if manner.archive is None else Archive(manner.archive, kind)
+        super().__init__(line, kind, "receive", manner, publish)
+        self._archive = archive
+        self._accepts_damage = manner.accept_damaged
+
+    async def _carry_out(self) -> Received:
+        if self._archive is not None:
+            await self._archive.open()
+        data, on_line = await self._receive(self._archive)
+        self._on_line = on_line
+        damage = self._damage_of(on_line)
+        self._refuse_damage(damage, on_line)
+        file, warnings = await self._read(data)
+        verified = await self._verify(file) if self._manner.verify else None
+        place = None
+        if self._archive is not None:
+            try:
+                place = await self._archive.finish(len(data), name_of_file(file))
+            except OSError as error:
+                raise self._reports.unwritten(error, data, self.account()) from error
+        return Received(
+            control=self._line.name,
+            kind=self.kind,
+            data=data,
+            file=file,
+            proof=self._proof_of(on_line),
+            damage=damage,
+            verified=verified,
+            archive=place,
+            duration_s=self._loop.time() - self._began_at,
+            warnings=warnings,
+        )
+
+    async def _receive(self, archive: Archive | None, why: str = "") -> tuple[bytes, LineAccount]:
+        data = bytearray()
+
+        def take(piece: bytes) -> None:
+            data.extend(piece)
+            if archive is not None:
+                archive.write(piece)
+            self.transfer.note_change()
+
+        strategy = self._line.receiver(f"receive {self.kind}{why}", take, self._patience)
+        self._ask_operator(sends=False, why=why)
+        account = await self._transfer(strategy)
+        return bytes(data), account
+
+    # What came ------------------------------------------------------------------------------------------------------
+
+    def _damage_of(self, on_line: LineAccount) -> Damage | None:
+        counted = self._line.counted
+        damage = Damage(places=on_line.damage_offsets, bytes=on_line.damaged_bytes, counted=counted)
+        return damage if damage or counted is not None or self._line.tells_damage else None
+
+    def _refuse_damage(self, damage: Damage | None, on_line: LineAccount) -> None:
+        if self._accepts_damage:
+            return
+        if damage:
+            raise self._reports.damaged(damage, self.account())
+        if not on_line.is_closed:
+            raise self._reports.unlike("it does not end with %, so something may be missing", self.account())
+
+    async def _read(self, data: bytes) -> tuple[ProgramFile | DataFile, tuple[str, ...]]:
+        try:
+            return await asyncio.to_thread(read_file, data, self.kind, self._line.profile)
+        except InvalidCommandError as error:
+            raise self._reports.unlike(error, self.account()) from error
+
+    async def _verify(self, file: ProgramFile | DataFile) -> Verified:
+        self._is_verifying = True
+        data, on_line = await self._receive(None, _AGAIN)
+        self._refuse_damage(self._damage_of(on_line), on_line)
+        again, _ = await self._read(data)
+        verified = verified_received(file.payload, again.payload)
+        if not verified:
+            error = self._reports.unequal(
+                f"the {self.kind} came twice, and not the same: {verified.proves}",
+                self.account(),
+                "one of them is damaged, or it was changed meanwhile: is the line disturbed? Receive it again",
+            )
+            error.verified = verified  # type: ignore[attr-defined]
+            raise error
+        return verified
+
+    def _proof_of(self, on_line: LineAccount) -> str:
+        if on_line.blocks:
+            return "xmodem EOT"
+        return "DC4 seen" if on_line.has_dc4 else "silence after %"
+
+
+def read_file(data: bytes, kind: Kind, profile: Profile) -> tuple[ProgramFile | DataFile, tuple[str, ...]]:
+    """
+    Read what came as a file of that kind; for a thread, for it may be large.
+
+    Returns:
+        It, and what is odd about it.
+
+    Raises:
+        InvalidCommandError: It is none of that kind.
+    """
+    if kind in {"program", "programs"}:
+        return _programs(data, kind, profile)
+    file = parse_data_file(data, DataKind(kind), eob=profile.eob)
+    problems = check_data_file(file)
+    for each in problems:
+        if each.severity is Severity.ERROR:
+            raise InvalidCommandError(each.what, hint=each.hint)
+    return file, tuple(str(each) for each in problems)
+
+
+def _programs(data: bytes, kind: Kind, profile: Profile) -> tuple[ProgramFile, tuple[str, ...]]:
+    file = parse_program_file(data, eob=profile.eob)
+    if not file.numbers:
+        raise InvalidCommandError("there is no program with a name in it")
+    warnings = []
+    if kind == "program" and len(file.programs) > 1:
+        warnings.append(f"{len(file.programs)} programs came, and one was expected: was ALL chosen at the control?")
+    if len(file.percent_lines) > 2:  # one pair
+        warnings.append("there are several pairs of % in it: to send it back, they must be one")
+    return file, tuple(warnings)
+
+
+def name_of_file(file: ProgramFile | DataFile) -> str | None:
+    """Return what a file is called in a folder; None: by its kind."""
+    if isinstance(file, ProgramFile) and len(file.programs) == 1 and file.numbers:
+        return f"O{file.numbers[0]:05d}"
+    return None
