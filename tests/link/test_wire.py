@@ -2,11 +2,25 @@
 
 from __future__ import annotations
 
+import sys
+
 from compax_aio.link.wire import WireHistory, readable
 
 
 def test_control_characters_are_shown_as_pictures_and_8_bit_bytes_in_hexadecimal() -> None:
     assert readable(b"S1\r\n>\x00\x11\x7f\xff\x80") == "S1␍␊>␀␑␡\\xff\\x80"
+
+
+def test_what_is_written_for_a_person_is_not_cut() -> None:
+    assert readable(b"x" * 1000) == "x" * 1000
+
+
+def test_what_is_kept_is_a_copy_for_what_was_read_may_hold_on_to_all_of_its_room() -> None:
+    history, read = WireHistory(), bytes(range(0x20, 0x60))
+    held = sys.getrefcount(read)
+    history.received(1.0, read)
+    history.sent(2.0, read)
+    assert sys.getrefcount(read) == held
 
 
 def test_pieces_of_one_answer_are_one_entry() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from typing import Final
 
 __all__ = ["WireHistory", "readable"]
@@ -10,47 +9,67 @@ __all__ = ["WireHistory", "readable"]
 _ENTRIES: Final = 24
 _BYTES_AN_ENTRY: Final = 96
 
-_CONTROL_PICTURES: Final = {code: 0x2400 + code for code in range(0x20)} | {0x7F: 0x2421}
+_PICTURES: Final[dict[int, int | str]] = {
+    **{code: 0x2400 + code for code in range(0x20)},
+    0x7F: 0x2421,
+    **{code: f"\\x{code:02x}" for code in range(0x80, 0x100)},
+}
 
 
 def readable(data: bytes) -> str:
     """Write *data* with control characters as pictures (``␍``) and 8-bit bytes in hexadecimal."""
-    return "".join(chr(_CONTROL_PICTURES.get(byte, byte)) if byte < 0x80 else f"\\x{byte:02x}" for byte in data)
+    return data.decode("latin-1").translate(_PICTURES)
+
+
+def _text(data: bytes) -> str:
+    """Copy what counts of *data*: bytes that were read may hold on to all of the room they were read into."""
+    return data[:_BYTES_AN_ENTRY].decode("latin-1")
 
 
 class WireHistory:
     """A ring of what went out (→) and came in (←), with the loop's time; pieces of one direction are joined."""
 
+    __slots__ = ("_entries",)
+
     def __init__(self) -> None:
-        self._entries: deque[tuple[float, str, bytes]] = deque(maxlen=_ENTRIES)
+        self._entries: list[tuple[float, str, str]] = []
+        """When, which way, and the first of it, a character for a byte."""
 
     def sent(self, at: float, data: bytes, *, goes_on: bool = False) -> None:
         """Note bytes that went out; where they go on with what was sent before, beside its answer, they are joined."""
         if goes_on:
             for back in range(1, min(2, len(self._entries)) + 1):
-                first_at, arrow, before = self._entries[-back]
-                if arrow == "→":
-                    self._entries[-back] = (first_at, arrow, (before + data)[:_BYTES_AN_ENTRY])
+                if self._entries[-back][1] == "→":
+                    self._join(-back, data)
                     return
-        self._entries.append((at, "→", data[:_BYTES_AN_ENTRY]))
+        self._add(at, "→", data)
 
     def received(self, at: float, data: bytes) -> None:
         """Note bytes that came in."""
         if self._entries and self._entries[-1][1] == "←":
-            first_at, arrow, before = self._entries.pop()
-            self._entries.append((first_at, arrow, (before + data)[:_BYTES_AN_ENTRY]))
+            self._join(-1, data)
         else:
-            self._entries.append((at, "←", data[:_BYTES_AN_ENTRY]))
+            self._add(at, "←", data)
+
+    def _add(self, at: float, arrow: str, data: bytes) -> None:
+        if len(self._entries) == _ENTRIES:
+            del self._entries[0]
+        self._entries.append((at, arrow, _text(data)))
+
+    def _join(self, place: int, data: bytes) -> None:
+        first_at, arrow, before = self._entries[place]
+        self._entries[place] = (first_at, arrow, (before + _text(data))[:_BYTES_AN_ENTRY])
 
     def received_since_sent(self) -> str | None:
         """Return what came in since something was last sent, readable; None if nothing did."""
         if self._entries and self._entries[-1][1] == "←":
-            return readable(self._entries[-1][2])
+            return self._entries[-1][2].translate(_PICTURES)
         return None
 
     def last_sent(self) -> str | None:
         """Return what went out last, readable and without its end sign; None if nothing did."""
-        return next((readable(data).rstrip("␍␊") for _, arrow, data in reversed(self._entries) if arrow == "→"), None)
+        texts = (text for _, arrow, text in reversed(self._entries) if arrow == "→")
+        return next((text.translate(_PICTURES).rstrip("␍␊") for text in texts), None)
 
     @property
     def has_received(self) -> bool:
@@ -59,4 +78,4 @@ class WireHistory:
 
     def lines(self) -> tuple[str, ...]:
         """Return the ring, oldest first: ``12.345 → PA100$␍``."""
-        return tuple(f"{at:.3f} {arrow} {readable(data)}" for at, arrow, data in self._entries)
+        return tuple(f"{at:.3f} {arrow} {text.translate(_PICTURES)}" for at, arrow, text in self._entries)
