@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections import deque
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final
@@ -53,12 +52,14 @@ def _key(text: str) -> tuple[str, str] | None:
 class Ledger:
     """Unanswered lines; the oldest is forgotten when there are very many, and looking for one takes no longer then."""
 
+    __slots__ = ("_asked", "_commands", "_lines", "_next_marker", "_owed")
+
     def __init__(self) -> None:
         self._next_marker = 0
-        self._lines: deque[Sent] = deque()
-        self._commands: deque[Sent] = deque()
+        self._lines: list[Sent] = []
+        self._commands: list[Sent] = []
         """Those of them that a bare prompt may belong to."""
-        self._owed: deque[Sent] = deque()
+        self._owed: list[Sent] = []
         """Those whose ``$`` was asked for."""
         self._asked: dict[tuple[str, str], int] = {}
         """How many queries bear each name."""
@@ -119,13 +120,13 @@ class Ledger:
             self._owed.append(sent)
 
     def _forget_oldest(self) -> Sent:
-        sent = self._lines.popleft()
+        sent = self._lines.pop(0)
         if sent.key is not None:
             self._asked[sent.key] -= 1
             return sent
-        self._commands.popleft()
+        self._commands.pop(0)
         if sent.wants_message:
-            self._owed.popleft()
+            self._owed.pop(0)
         return sent
 
     def choose_marker(self) -> str:

@@ -100,7 +100,7 @@ class Poller:
         self._quantities: dict[str, _Quantity] = {}
         self._task: asyncio.Task[None] | None = None
         self._is_reading = False
-        self._joined = asyncio.Event()
+        self._joined: asyncio.Future[None] | None = None
         self._is_over = False
         self._lost: ConnectionLostError | None = None
 
@@ -123,7 +123,8 @@ class Poller:
         for name, read in readers.items():
             quantity = self._quantities.setdefault(name, _Quantity(name, read, watch.interval_s, watch.due_at))
             quantity.due_at = min(quantity.due_at, watch.due_at)
-        self._joined.set()
+        if self._joined is not None and not self._joined.done():
+            self._joined.set_result(None)
         if self._task is None:
             self._task = self._loop.create_task(self._poll(), name=f"{self._name}: watch")
         return watch
@@ -226,10 +227,10 @@ class Poller:
 
     async def _wait_until(self, due_at: float) -> None:
         """Wait until *due_at*, or until somebody joins."""
-        self._joined.clear()
+        self._joined = self._loop.create_future()
         with suppress(TimeoutError):
             async with asyncio.timeout_at(due_at):
-                await self._joined.wait()
+                await self._joined
 
     async def _read(self, quantity: _Quantity) -> None:
         error: CompaxError | None = None

@@ -16,6 +16,8 @@ class Deadline:
         when_over: What is called.
     """
 
+    __slots__ = ("_at", "_loop", "_timer", "_when_over")
+
     def __init__(self, when_over: Callable[[], None]) -> None:
         self._when_over = when_over
         self._loop = asyncio.get_running_loop()

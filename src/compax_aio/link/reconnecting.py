@@ -122,8 +122,9 @@ class Reconnecting:
         self._on_restored = on_restored
         self._log = Seldom(logging.getLogger("compax_aio.link"), name)
         self._loop = asyncio.get_running_loop()
-        self._random = Random(repr(name))
-        self._pauses_s = backoff.pauses_s(self._random)
+        self._random: Random | None = None
+        self._pauses_s: Iterator[float] = iter(())
+        """Made when they are needed: a state of random numbers takes more memory than all the rest of a line."""
         self._restored_at = self._loop.time()
         self._is_over = False
         self._task: asyncio.Task[None] | None = None
@@ -150,7 +151,8 @@ class Reconnecting:
     def begin(self, line: LostLine, error: ConnectionLostError, *, at_once: bool) -> None:
         """Try to get *line* back, which was lost with *error*, until it is there or given up; *at_once* or soon."""
         # One that is lost again and again is tried as rarely as one that cannot be opened.
-        if self._loop.time() - self._restored_at >= self._backoff.slowest_s:
+        if self._random is None or self._loop.time() - self._restored_at >= self._backoff.slowest_s:
+            self._random = self._random or Random(repr(self._name))
             self._pauses_s = self._backoff.pauses_s(self._random)
 
         def lose_patience() -> None:
