@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import logging
 import sys
+import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from importlib import import_module
@@ -19,7 +20,7 @@ from typing import Final, TypeAlias
 from .measuring import FULL, LEAST, SHORT, Effort, Figure, Machine, Noise
 from .measuring.reporting import as_json, as_table, write_json
 
-__all__ = ["FIGURES", "main", "measure"]
+__all__ = ["FIGURES", "has_failed", "main", "measure"]
 
 FIGURES: Final = (
     "exchange_cost",
@@ -34,6 +35,8 @@ FIGURES: Final = (
 )
 """Modules of :mod:`benchmarks.figures`, in the order of the table."""
 
+_FAILED: Final = "failed: "
+
 Measure: TypeAlias = Callable[[Effort], Sequence[Figure]]
 
 
@@ -43,7 +46,11 @@ def _measure_of(name: str) -> Measure:
 
 
 def measure(names: Sequence[str], effort: Effort, tell: Callable[[str], object]) -> Mapping[str, Sequence[Figure]]:
-    """Measure the figures of those modules, one after the other; Ctrl-C leaves off, and what was measured stays."""
+    """
+    Measure the figures of those modules, one after the other.
+
+    Ctrl-C leaves off, and what was measured stays; so does all else where one module fails, whose figure says why.
+    """
     measured: dict[str, Sequence[Figure]] = {}
     for number, name in enumerate(names, 1):
         tell(f"[{number}/{len(names)}] {name} …")
@@ -52,6 +59,9 @@ def measure(names: Sequence[str], effort: Effort, tell: Callable[[str], object])
         except KeyboardInterrupt:
             tell(f"left off in {name}; what follows was measured before")
             break
+        except Exception as error:
+            tell(traceback.format_exc())
+            measured[name] = [Figure(name=name, value=None, notes=[f"{_FAILED}{type(error).__name__}: {error}"])]
     return measured
 
 
@@ -60,7 +70,7 @@ def _parser() -> argparse.ArgumentParser:
         prog="python -m benchmarks",
         description=__doc__.partition("\n\n")[0],
         epilog=f"figures: {', '.join(FIGURES)}. Exit status: 0 measured, whether the targets are reached or not; "
-        "130 ended by Ctrl-C; 2 bad arguments.",
+        "1 a figure failed; 130 ended by Ctrl-C; 2 bad arguments.",
     )
     length = parser.add_mutually_exclusive_group()
     length.add_argument("--full", action="store_true", help="minutes a figure, for numbers to be printed")
@@ -84,7 +94,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print(as_table([figure for of_module in measured.values() for figure in of_module], machine, effort))
     if asked.json is not None:
         write_json(asked.json, as_json(measured, machine, effort))
-    return 0 if len(measured) == len(names) else 130
+    if len(measured) < len(names):
+        return 130
+    return 1 if any(has_failed(each) for of_module in measured.values() for each in of_module) else 0
+
+
+def has_failed(figure: Figure) -> bool:
+    """Whether its module could not measure it, though it should."""
+    return figure.value is None and any(note.startswith(_FAILED) for note in figure.notes)
 
 
 if __name__ == "__main__":
