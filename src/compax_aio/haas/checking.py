@@ -232,7 +232,7 @@ def _no_name(program: Program) -> Finding:
 
 
 def _bad_name(program: Program, digits: int) -> Finding:
-    what = f"{shown(_name_of(program)[:20])} is no name of a program"
+    what = f"{shown(program.blocks[0].text[:20])} is no name of a program"
     hint = f"it is O and a number of at most {digits} digits"
     return Finding(Kind.BAD_NAME, program.offset, Severity.ERROR, what, hint, ALARMS["illegal-program-name"])
 

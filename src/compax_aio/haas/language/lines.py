@@ -41,7 +41,7 @@ def as_bytes(text: str | bytes | bytearray | memoryview) -> bytes:
     try:
         return text.encode("latin-1")
     except UnicodeEncodeError as error:
-        line, column = Lines(text[: error.start].encode("latin-1")).place(error.start)
+        line, column = Lines(text[: error.start].encode("latin-1") + b"?").place(error.start)
         raise InvalidCommandError(
             f"line {line}, column {column}: {text[error.start]!r} has no code of 8 bits",
             hint="a control knows 7-bit ASCII alone; write it with other characters",
