@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 from compax_aio.haas.transfers.account import Ending
 from compax_aio.haas.transfers.strategy import Patience, Strategy
@@ -89,4 +90,4 @@ class Bench:
 def in_pieces(data: bytes, cuts: Sequence[int]) -> list[bytes]:
     """Cut *data* at *cuts*."""
     places = sorted({0, len(data), *(cut % (len(data) + 1) for cut in cuts)})
-    return [data[begin:end] for begin, end in zip(places, places[1:], strict=False)]
+    return [data[begin:end] for begin, end in pairwise(places)]

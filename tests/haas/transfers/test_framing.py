@@ -35,7 +35,8 @@ def test_a_file_begins_at_the_percent_sign_with_the_ends_of_blocks_in_front_of_i
 
 
 def test_what_is_printed_in_front_of_it_is_none_of_it() -> None:
-    assert started(b"PART 7\r\n%\r\nO1") == (b"PART 7\r\n", b"\r\n%\r\nO1")
+    assert started(b"PART 7\r\n%\r\nO1") == (b"PART 7\r\n", b"%\r\nO1")
+    assert started(b"PART 7\r", b"\n", b"\n%\nO1") == (b"PART 7\r\n\n", b"\n%\nO1")
 
 
 @pytest.mark.parametrize("pieces", [(b"50% DONE\r",), (b"50", b"% DONE\r"), (b"X ", b" % ")])
@@ -56,7 +57,9 @@ def test_a_file_is_closed_by_a_percent_sign_alone(text: bytes) -> None:
     assert is_closed(text)
 
 
-@pytest.mark.parametrize("text", [b"%", b"\n%", b"\n%\n", b"%\nO1\n", b"%\nO1 %", b"%\nO1\n%X", b"%\nO1\n%\nO2", b"% \n"])
+@pytest.mark.parametrize(
+    "text", [b"%", b"\n%", b"\n%\n", b"%\nO1\n", b"%\nO1 %", b"%\nO1\n%X", b"%\nO1\n%\nO2", b"% \n"]
+)
 def test_nothing_else_closes_it(text: bytes) -> None:
     assert not is_closed(text)
 

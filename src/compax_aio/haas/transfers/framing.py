@@ -11,6 +11,7 @@ _ENDS: Final = b"\r\n"
 _BLANKS: Final = b" \t\r\n"
 _MOST_LEAD_BYTES: Final = 8
 """Of ends of blocks in front of the first percent sign, which controls send (OpenDNC: one LF)."""
+_MOST_ENDS_BYTES: Final = 64
 _WINDOW_BYTES: Final = 32
 
 _PERCENT_LINE: Final = re.compile(rb"(?:\A|[\r\n])[ \t]*(%)")
@@ -24,8 +25,10 @@ class FileStart:
     """
 
     def __init__(self) -> None:
-        self._lead = b""
+        self._ends = b""
         """Ends of blocks that came last."""
+        self._is_first_end_of_text = False
+        """Whether the first of them ends a line of something else."""
         self._is_in_line = False
         """Whether something else stands in the line already."""
 
@@ -40,16 +43,30 @@ class FileStart:
         for match in _PERCENT_LINE.finditer(data):
             if data[match.start()] in _ENDS or not self._is_in_line:
                 before = data[: match.start(1)]
-                return before, self._lead_behind(before) + data[match.start(1) :]
-        self._lead = self._lead_behind(data)
-        if text := data.rstrip(b" \t"):
-            self._is_in_line = text[-1] not in _ENDS
+                self._note(before)
+                return before, self._lead() + data[match.start(1) :]
+        self._note(data)
         return data, None
 
-    def _lead_behind(self, data: bytes) -> bytes:
+    def _note(self, data: bytes) -> None:
         text = data.rstrip(_BLANKS)
-        blanks = data[len(text) :] if text else self._lead + data
-        return bytes(byte for byte in blanks if byte in _ENDS)[-_MOST_LEAD_BYTES:]
+        ends = bytes(byte for byte in data[len(text) :] if byte in _ENDS)
+        if text:
+            self._ends, self._is_first_end_of_text = ends, True
+        else:
+            self._ends += ends
+        if len(self._ends) > _MOST_ENDS_BYTES:
+            self._ends, self._is_first_end_of_text = self._ends[-_MOST_ENDS_BYTES:], False
+        if ends:
+            self._is_in_line = False
+        elif text:
+            self._is_in_line = True
+
+    def _lead(self) -> bytes:
+        ends = self._ends
+        if self._is_first_end_of_text:
+            ends = ends[2:] if ends.startswith(b"\r\n") else ends[1:]
+        return ends[-_MOST_LEAD_BYTES:]
 
 
 class FileEnd:
