@@ -11,7 +11,6 @@ import asyncio
 import logging
 from collections.abc import Callable
 from functools import partial
-from typing import Final
 
 from ..errors import CompaxError
 from .contract import (
@@ -27,6 +26,7 @@ from .contract import (
     TurnOver,
 )
 from .deadline import Deadline
+from .doubt import Doubt
 from .exchanges import Exchange, ExchangeQueue
 from .failures import Failures
 from .port import Port
@@ -37,9 +37,6 @@ from .telling import Telling
 from .wire import WireHistory
 
 __all__ = ["Turns"]
-
-_MOST_IN_VAIN: Final = 8
-"""Times a line comes in step and is in doubt again at once, before it counts as one that babbles."""
 
 
 class Turns:
@@ -86,7 +83,6 @@ class Turns:
         self._failures = failures
         self._history = history
         self._answer_timeout_s = answer_timeout_s
-        self._resync_attempts = resync_attempts
         self._on_event = on_event
         self._on_silence = on_silence
         self._spares = spares
@@ -98,11 +94,7 @@ class Turns:
         """Stops that were acknowledged before it was known by whom."""
         self._doubtful: Exchange | None = None
         self._in_step: asyncio.Future[None] | None = None
-        self._markers_left = self._more_markers = 0
-        self._times_in_vain = 0
-        """Came in step, and was in doubt again before any exchange was answered."""
-        self._is_pursuing = False
-        self._may_send_ahead = False
+        self._doubt = Doubt(resync_attempts)
         self._is_reading = False
         self._is_ended = False
         self._deadline = Deadline(self._time_is_up)
@@ -142,7 +134,7 @@ class Turns:
     def line_opened(self) -> None:
         """Begin to get in step on a new line."""
         self._protocol.line_opened()
-        self._begin_doubt()
+        self._doubt.begin()
         self.pump()
 
     def receive(self, data: bytes) -> None:
@@ -150,7 +142,7 @@ class Turns:
         self._protocol.receive(data)
         self._flush(Way.GOES_ON)
         self._take_events()
-        if self._is_pursuing and self._protocol.stranger(time_is_over=False) is not None:
+        if self._doubt.is_pursued and self._protocol.stranger(time_is_over=False) is not None:
             self._give_up()
         self.pump()
 
@@ -174,7 +166,7 @@ class Turns:
         self._protocol.preempt(text)
         self._flush(Way.PREEMPT)
         self._take_events()
-        self._begin_doubt()
+        self._doubt.begin()
         self._give_time()
         if self._in_step is None or self._in_step.done():
             self._in_step = self.until_in_step()
@@ -204,7 +196,7 @@ class Turns:
         self._protocol.resume()
         self._grace.cancel()
         self._fail_doubtful()
-        self._begin_doubt()
+        self._doubt.begin()
         self.pump()
 
     # Turns ----------------------------------------------------------------------------------------------------------
@@ -266,15 +258,13 @@ class Turns:
         elif isinstance(event, LateEnding):
             self._stats.late_answers += 1
             self._log.tell(logging.INFO, "the answer to %r came late", event.sent)
-            if self._is_pursuing and not self._markers_left and self._more_markers:
-                self._more_markers -= 1
-                self._markers_left = 1  # the device speaks: the next marker may be the one that is answered in time
+            self._doubt.late_answer_came()
             if self._doubtful is not None and self._doubtful.text == event.sent:
                 self._end(self._doubtful, event.outcome)
         elif isinstance(event, InStep):
             self._end_doubt()
         elif isinstance(event, HoldOver):
-            self._begin_doubt()
+            self._doubt.begin()
         elif not isinstance(event, MarkerSpent):
             self._ensure_doubt_is_pursued()
             self._on_event(event)
@@ -286,9 +276,9 @@ class Turns:
         else:
             self._stats.answered(self._loop.time() - self._began_at)
         if self._protocol.in_doubt:
-            self._begin_doubt()
+            self._doubt.begin()
         if exchange is not None:
-            self._times_in_vain = 0
+            self._doubt.exchange_ended()
             self._end(exchange, outcome)
 
     def _end(self, exchange: Exchange, outcome: TurnOver) -> None:
@@ -299,37 +289,31 @@ class Turns:
 
     # Doubt ----------------------------------------------------------------------------------------------------------
 
-    def _begin_doubt(self) -> None:
-        self._markers_left = self._more_markers = self._resync_attempts
-        self._is_pursuing = True
-        self._may_send_ahead = True
-
     def _ensure_doubt_is_pursued(self) -> None:
-        is_babble = self._times_in_vain >= _MOST_IN_VAIN
-        is_needed = not self._is_pursuing and self._protocol.in_doubt and not self._markers_left
-        if is_needed and not self._protocol.is_busy and not is_babble:
-            self._begin_doubt()
+        doubt = self._doubt
+        is_needed = self._protocol.in_doubt and not (doubt.is_pursued or doubt.markers_left or doubt.is_babble)
+        if is_needed and not self._protocol.is_busy:
+            doubt.begin()
 
     def _pursue_doubt(self) -> bool:
         """Send the next thing that helps to get in step; False when there is nothing left to try."""
-        stop = self.queue.first_stop()
+        doubt, stop = self._doubt, self.queue.first_stop()
         if stop is not None and not stop.times_ahead:
-            self._markers_left = max(self._markers_left, 1)  # one that comes late has its chance, too
-        if not self._markers_left or self._port.is_stuck:
+            doubt.stop_waits()
+        if not doubt.markers_left or self._port.is_stuck:
             return False
         if self._protocol.held is not None:
             if stop is None:
                 return False
-            self._markers_left -= 1
+            doubt.marker_goes()
             self._send_ahead(stop)
-        elif stop is not None and self._may_send_ahead:
+        elif stop is not None and doubt.may_send_ahead:
             # In turn with the markers, for half a line in the device's buffer may spoil either; the exchange itself
             # follows when in step.
-            self._may_send_ahead = False
+            doubt.stop_goes_ahead()
             self._send_ahead(stop)
         else:
-            self._markers_left -= 1
-            self._may_send_ahead = True
+            doubt.marker_goes()
             self._protocol.send_marker()
             self._flush(Way.MARKER)
         self._give_time()
@@ -342,9 +326,7 @@ class Turns:
 
     def _end_doubt(self) -> None:
         self._stats.resynchronisations += 1
-        self._times_in_vain += 1
-        self._markers_left = 0
-        self._is_pursuing = False
+        self._doubt.end()
         self._grace.cancel()
         self._fail_doubtful()
         if self._in_step is not None and not self._in_step.done():
@@ -356,8 +338,8 @@ class Turns:
             self.fail_waiting(partial(self._failures.hold, hold), but=self._spares)
         elif (stranger := self._protocol.stranger(time_is_over=True)) is not None:
             self.fail_waiting(partial(self._failures.stranger, stranger), but=self._spares)
-        elif self._times_in_vain >= _MOST_IN_VAIN:
-            self.fail_waiting(partial(self._failures.babble, self._times_in_vain), but=self._spares)
+        elif self._doubt.is_babble:
+            self.fail_waiting(partial(self._failures.babble, self._doubt.times_in_vain), but=self._spares)
         else:
             self._on_silence()
             self.fail_waiting(self._failures.silence, but=self._spares)
@@ -370,8 +352,7 @@ class Turns:
     ) -> None:
         """Fail everything that waits, the opening too; those for which *but* holds are queued anew."""
         self._grace.cancel()
-        self._markers_left = self._times_in_vain = 0
-        self._is_pursuing = False
+        self._doubt.give_up()
         waiting = [exchange for exchange in (self._doubtful, self._outstanding) if exchange is not None]
         waiting += [exchange for exchange, _ in self._unproved] + self.queue.take_all()
         self._outstanding = self._doubtful = None
@@ -416,6 +397,6 @@ class Turns:
         exchange.received = self._history.received_since_sent()
         if not exchange.settles_late:
             self._fail_doubtful()
-        self._begin_doubt()
+        self._doubt.begin()
         if self._protocol.held is not None:
             self._grace.put_off(self._answer_timeout_s)
