@@ -58,6 +58,18 @@ class _Holding(Protocol):
         """Whether it does so now."""
 
 
+@runtime_checkable
+class _Heeding(Protocol):
+    """A device that a host can keep from sending by a modem line."""
+
+    @property
+    def heeds_hold(self) -> bool:
+        """Whether it is set so."""
+
+    def hold_output(self, is_held: bool, now: float | None = None) -> None:
+        """Stop sending at once, or go on."""
+
+
 class DeviceLine:
     """
     The one line of a device in one event loop; it exists whether somebody is connected or not.
@@ -147,11 +159,20 @@ class DeviceLine:
         if self._hold is not None:
             self._hold(self._is_held or self._is_device_holding)
 
+    def host_is_full(self, is_full: bool) -> bool:
+        """Take note that who is connected has no room, or has again; whether the device heeds that."""
+        device = self._device
+        if not isinstance(device, _Heeding) or not device.heeds_hold:
+            return False
+        device.hold_output(is_full, self._loop.time())
+        return True
+
     def disconnect(self) -> None:
         """Let go of who was connected; what was on its way is lost."""
         if self._way is not None:
             self._way.end()
         self._write = self._hold = self._way = None
+        self.host_is_full(False)
         self._device.disconnect(self._loop.time())
 
     def time(self) -> float:
@@ -197,7 +218,8 @@ class Connection(asyncio.Protocol):
     The device's end of one connection, TCP or in memory.
 
     While another connection holds the line, a new one is hung up at once, as most terminal servers do. Bytes for a
-    host that does not read are lost after its buffers are full, as on a serial line without handshake.
+    host that does not read are lost after its buffers are full, as on a serial line without handshake; a device that
+    heeds a modem line of the host keeps them.
     """
 
     def __init__(self, line: DeviceLine, connections: set[Connection]) -> None:
@@ -229,12 +251,13 @@ class Connection(asyncio.Protocol):
             self._line.disconnect()
 
     def pause_writing(self) -> None:
-        """Lose bytes from now on."""
-        self._overrun = True
+        """Lose bytes from now on, or let the device keep them."""
+        self._overrun = not self._line.host_is_full(True)
 
     def resume_writing(self) -> None:
         """Send again."""
         self._overrun = False
+        self._line.host_is_full(False)
 
     def abort(self) -> None:
         """Hang up."""

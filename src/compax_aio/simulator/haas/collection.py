@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import deque
 from collections.abc import Callable, Mapping
 from math import inf, isnan, nan
@@ -24,6 +25,7 @@ _MOST_GAPS: Final = 100_000
 _HIGHEST_VARIABLE: Final = 20_000
 _SYSTEM_VARIABLES: Final = range(1000, 10_000)
 _READ: Final = "Q600"
+_WRITE: Final = re.compile(r"(\d{1,6}) +([-+]?(?:\d{1,12}(?:\.\d{0,12})?|\.\d{1,12}))")
 
 
 class Collection:
@@ -83,7 +85,7 @@ class Collection:
     @property
     def is_on(self) -> bool:
         """Whether requests are answered (Setting 143)."""
-        return self._knobs.collection != "off" and self._around.memory.is_on(DATA_COLLECTION, otherwise=True)
+        return self._around.memory.is_on(DATA_COLLECTION, otherwise=self._knobs.collection != "off")
 
     # Requests
 
@@ -183,12 +185,10 @@ class Collection:
         return f"{self._head(_READ)}, {text.lstrip('0') or '0'},{shown:>{self._knobs.value_width}}"
 
     def _write(self, text: str) -> str:
-        number_text, _, value_text = text.partition(" ")
-        memory = self._around.memory
-        try:
-            number, value = int(number_text), float(value_text)
-        except ValueError:
+        memory, found = self._around.memory, _WRITE.fullmatch(text)
+        if found is None:
             return UNKNOWN_REQUEST
+        number, value = int(found[1]), float(found[2])
         if number not in memory.macros and not memory.can_write(number):
             return UNKNOWN_REQUEST
         was = memory.macros.get(number, nan)

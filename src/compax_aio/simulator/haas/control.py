@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from math import inf
 
+from compax_aio.haas.facts.port_settings import Synchronization
+
 from ..line import Host
 from .checksums import stand_in
 from .interior import Interior
@@ -182,6 +184,11 @@ class SimulatedControl:
             self._inside.around.note(LogKind.TROUBLE, f"{lost} bytes lost with the port")
         self._inside.around.note(LogKind.DISCONNECTED)
 
+    @property
+    def heeds_hold(self) -> bool:
+        """Whether it stops sending when the host says so by pin 5; otherwise what a host has no room for is lost."""
+        return self.knobs.mode is Synchronization.RTS_CTS
+
     def hold_output(self, is_held: bool, now: float | None = None) -> None:
         """Set pin 5, the host's hold: with RTS/CTS the control stops sending at once, or goes on."""
 
@@ -242,6 +249,14 @@ class SimulatedControl:
     def dprnt(self, text: str, now: float | None = None) -> None:
         """Let a program print a line (DPRNT); ``*`` is a space."""
         self._act(now, lambda: self._if_on(lambda at: self._inside.collection.printed(text, at)))
+
+    def popen(self, now: float | None = None) -> None:
+        """Let a program open the port for what it prints (POPEN): DC2 is sent."""
+        self._act(now, lambda: self._if_on(lambda at: self._inside.punch(True, at)))
+
+    def pclos(self, now: float | None = None) -> None:
+        """Let a program close it (PCLOS): DC4 is sent."""
+        self._act(now, lambda: self._if_on(lambda at: self._inside.punch(False, at)))
 
     def overhear(self, text: str, now: float | None = None) -> None:
         """Send an answer to another host, as newer controls do over Ethernet."""

@@ -100,7 +100,7 @@ class Intake:
         """Set pin 4 as it is while nothing is received, or is about to be."""
         if self._mode is not Synchronization.RTS_CTS or self._around.knobs.pin4_idle == "high":
             return
-        is_wanted = self._listener.operation is not None or self._listener.awaits_requests
+        is_wanted = self._may_store or self._listener.awaits_requests
         if is_wanted == self._wire.is_stopped:
             self._set_line(is_wanted, now)
 
@@ -157,7 +157,7 @@ class Intake:
                 self._befall(fault[1])
                 return
             count = count if fault is None else fault[0]
-            if operation.buffers and (self._take_time_s or operation.is_full):
+            if operation.buffers and (self._take_time_s or operation.can_fill):
                 room = (self._size if self.is_stopped or not self._may_stop else self._hwm) - self.filled
                 count = max(1, min(count, room))
         at = wire.next_at
@@ -257,6 +257,8 @@ class Intake:
             left = bytes(self._data)
             self._data.clear()
             self._listener.heard(left, self._next_take_at, 0.0)
+            if self.is_stopped:
+                self._go_on(self._next_take_at)
             has_taken = True
         return has_taken
 
@@ -287,6 +289,8 @@ class Intake:
         self.is_stopped = False
         if self._mode is Synchronization.RTS_CTS:
             self._set_line(True, at)
+        elif self._mode is Synchronization.DC_CODES and not self._may_store:
+            pass  # the reader is off
         elif not self._trouble.loses("Xon"):
             self._around.note(LogKind.FLOW, "Xon", at)
             self._transmitter.sign(bytes([DC1]), at)

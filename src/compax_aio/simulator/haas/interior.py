@@ -15,7 +15,7 @@ from .hands import Hands
 from .intake import Intake
 from .knobs import Knobs
 from .log import Log, LogKind
-from .operations import Feeding, Operation, StreamReceiving, StreamSending
+from .operations import Feeding, Operation, StreamReceiving, StreamSending, send_code
 from .parity import ByteForm
 from .presses import ALL, PROGRAMS, Press
 from .running import Running
@@ -23,6 +23,7 @@ from .sinks import Checksum, ProgramSink, Sink, TableSink
 from .surroundings import Surroundings
 from .transmitter import Transmitter
 from .trouble import Trouble
+from .xmodem import XmodemReceiving, XmodemSending
 
 __all__ = ["Interior"]
 
@@ -60,6 +61,7 @@ class Interior:
         self._last_lost = 0
         self._checksum = checksum
         self.last_received: list[str] = []
+        self._prints_at = knobs.dprnt_every_s if knobs.dprnt else inf
         self.intake.set_idle_line(0.0)
 
     # Time
@@ -67,6 +69,8 @@ class Interior:
     def advance(self, until: float) -> None:
         """Let everything happen that is due until then."""
         until = max(until, self.around.now)
+        while not self.around.is_on and (count := self.wire.arrived(until)):
+            self.wire.take(count)
         while True:
             at = min(self._due_at(), until)
             if self.around.is_on and self.intake.step(at):
@@ -81,7 +85,7 @@ class Interior:
         """When something happens by itself that is not a byte."""
         if not self.around.is_on:
             return inf
-        at = min(self.running.next_at(), self.hands.next_at())
+        at = min(self.running.next_at(), self.hands.next_at(), self._prints_at)
         return at if self.operation is None else min(at, self.operation.next_at())
 
     def _run(self, now: float) -> None:
@@ -94,6 +98,10 @@ class Interior:
             self.running.run(now)
         if self.hands.next_at() <= now:
             self.hands.run(now)
+        if self._prints_at <= now:
+            self._prints_at = now + self.around.knobs.dprnt_every_s
+            if self.operation is None:
+                self.collection.printed(self.around.knobs.dprnt, now)
 
     def next_at(self) -> float:
         """When something may happen that somebody sees."""
@@ -192,7 +200,7 @@ class Interior:
         return [name]
 
     def _sending(self, what: str, data: bytes) -> Operation:
-        return StreamSending(self, what, data)
+        return XmodemSending(self, what, data) if self._by_blocks else StreamSending(self, what, data)
 
     def receive(self, what: str, now: float) -> None:
         """
@@ -212,12 +220,17 @@ class Interior:
         self.begin(self._receiving(what, sink), now)
 
     def _receiving(self, what: str, sink: Sink) -> Operation:
-        return StreamReceiving(self, what, sink)
+        return XmodemReceiving(self, what, sink) if self._by_blocks else StreamReceiving(self, what, sink)
+
+    @property
+    def _by_blocks(self) -> bool:
+        return self.around.knobs.mode is Synchronization.XMODEM
 
     def feed(self, now: float) -> None:
         """Press MDI DNC twice."""
         self.around.note(LogKind.KEY, "dnc", now)
-        self.begin(Feeding(self, DncSink(self.around)), now)
+        sink = DncSink(self.around)
+        self.begin(XmodemReceiving(self, "dnc", sink) if self._by_blocks else Feeding(self, sink), now)
 
     def hold_by_line(self, is_held: bool, now: float) -> None:
         """Take pin 5."""
@@ -227,6 +240,10 @@ class Interior:
                 self.transmitter.hold(now)
             else:
                 self.transmitter.release(now)
+
+    def punch(self, is_on: bool, now: float) -> None:
+        """Let a program open the port for what it prints, or close it (POPEN, PCLOS)."""
+        send_code(self, "DC2" if is_on else "DC4", now)
 
     def reset(self, now: float) -> None:
         """Press RESET: what it is at ends, alarms go, and a frozen control lives again."""
@@ -268,6 +285,7 @@ class Interior:
         self.thaw(now)
         self.collection.begin_anew()
         self.running.switch_on(now)
+        self._prints_at = now + around.knobs.dprnt_every_s if around.knobs.dprnt else inf
         self.intake.clear(now)
         self.hands.begin(now)
 

@@ -90,7 +90,7 @@ class Knobs:
     # The line
 
     parity_in_bytes: bool = False
-    """The eighth bit of bytes on the line is the parity bit, both ways, as if both ends were 8N1; a wrong one is seen."""
+    """The eighth bit on the line is the parity bit, both ways, as if both ends were 8N1; a wrong one is seen."""
     host_queue: Annotated[int, Range(1, _MOST_BYTES)] = 4096
     """Bytes that the driver of the host takes before it holds the program up."""
     lost_on_close: bool = False

@@ -42,6 +42,8 @@ class Operation(Protocol):
     """For people: ``sending O01234``."""
     buffers: bool
     """What comes goes through the receive buffer."""
+    can_fill: bool
+    """It may have to leave bytes there."""
     signs: bytes
     """Characters of which the very time of arrival matters."""
 
@@ -100,7 +102,7 @@ class StreamSending:
         data: The file.
     """
 
-    buffers = False
+    buffers = can_fill = False
     signs = b""
     is_full = False
     needs = 64
@@ -153,6 +155,7 @@ class StreamReceiving:
     """
 
     buffers = True
+    can_fill = False
     signs = b"%"
     needs = 64
 
@@ -246,7 +249,7 @@ class Feeding:
     """
 
     name = "dnc"
-    buffers = True
+    buffers = can_fill = True
     signs = b"%"
     needs = 64
 
