@@ -46,6 +46,10 @@ class OwedAnswers:
                     return request
         return None
 
+    def hides(self, request: Request) -> bool:
+        """Whether a late answer to something that is owed could be taken for the answer to *request*."""
+        return bool(self._requests) and (request.command not in _NAMED or request in self._requests)
+
     def probe(self) -> Request:
         """
         Return a question whose answer cannot be a late one to anything that is owed.

@@ -6,14 +6,15 @@ same: it is a pause, and when nothing has come in it, nothing is on its way. A q
 been silent for a moment, so not while a program prints; a control that was polled without pause has frozen.
 
 An answer that did not come in time is *owed*. Most answers name what they answer, but not all: ``STATUS, BUSY`` is one
-to anything. So while something is owed, the next question is preceded by another one whose answer cannot be mistaken;
-when that has come, what was owed is lost, for a control answers in order.
+to anything. So while something is owed, a question whose answer could be mistaken is preceded by another one whose
+answer cannot; when that has come, what was owed is lost, for a control answers in order.
 
 A transfer is one turn. The bytes that come in it are the file's, and those of a late answer are taken out.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Final
 
 from ..errors import InvalidCommandError, LinkProtocolError
@@ -40,7 +41,7 @@ from .protocol_events import (
 )
 from .protocol_states import BUSY, DOUBTFUL, TRANSITIONS, State, Step
 from .settings import ControlSettings
-from .transfers.account import Ending
+from .transfers.account import Ending, Phase
 from .transfers.choosing import HELD_BY_SIGNS
 from .transfers.strategy import Strategy
 
@@ -317,15 +318,21 @@ class HaasProtocol:
             self._probe = None
             self._begin_pause(Step.CAUGHT_UP)
             self._events.append(GoesOn())
-        elif self.state is State.ASKING and belonging(self._asked, text) in {Belongs.YES, Belongs.PERHAPS}:
-            self._events.append(Answered(text))
-            self._end_request(Step.ANSWERED)
+        elif self.state is State.ASKING and belonging(self._asked, text) is Belongs.YES:
+            self._answered(text)
         elif (late := self._owed.take(text)) is not None:
             self._events.append(LateEnding(late.text, Answered(text)))
+        elif self.state is State.ASKING and belonging(self._asked, text) is Belongs.PERHAPS:
+            self._answered(text)
         elif self.state is State.ASKING and belonging(self._asked, text) is Belongs.UNKNOWN:
             self._fail(text)
         else:
             self._events.append(Overheard(text))
+
+    def _answered(self, text: str) -> None:
+        self._owed.clear()  # a control answers in order
+        self._events.append(Answered(text))
+        self._end_request(Step.ANSWERED)
 
     def _read_broken(self, data: bytes) -> None:
         text = data[:_SHOWN_BYTES].decode("latin-1")
@@ -379,7 +386,7 @@ class HaasProtocol:
             self._hold_back(by_xoff=True)
         elif self._strategy is not None:
             self._begin_transfer()
-        elif self._owed:
+        elif self._owed.hides(self._asked):
             self._probe = self._owed.probe()
             self._step(Step.PROBE_SENT)
             self._ask(self._probe)
@@ -411,21 +418,21 @@ class HaasProtocol:
         self._step(Step.TRANSFER_BEGUN)
         level = LineLevel(self.level.bytes_per_s, lambda: self.level.unsent() + self._unwritten_bytes)
         self._transfer.begin(level, self._write, reader_is_on=is_reader_on)
+        self._events += self._transfer.take_notes()
 
     def _read_in_transfer(self, data: bytes, is_damaged: bool) -> None:
         strategy = self._transfer
-        while data and self._may_answer(strategy):
-            if is_damaged:
-                self._splitter.note_damage()
-            end = _behind_answer(data)
-            for part in self._splitter.feed(data[:end]):
-                self._read_part_in_transfer(strategy, part)
+        while data:
+            may_answer = self._may_answer(strategy)
+            end = _behind_answer(data) if may_answer or strategy.phase is Phase.WAIT_START else len(data)
+            if may_answer:
+                if is_damaged:
+                    self._splitter.note_damage()
+                for part in self._splitter.feed(data[:end]):
+                    self._read_part_in_transfer(strategy, part)
+            else:
+                self._give(strategy, data[:end], is_damaged, self._read_answers)
             data, is_damaged = data[end:], False
-        if data:
-            if is_damaged:
-                strategy.note_damage()
-            if foreign := strategy.receive(data):
-                self._read_answers(foreign, False)
         self._note_transfer()
 
     def _may_answer(self, strategy: Strategy) -> bool:
@@ -436,15 +443,17 @@ class HaasProtocol:
         if isinstance(part, Frame):
             self._read_frame(part.text)
         elif isinstance(part, Outside):
-            self._feed(strategy, part.data, part.is_damaged)
+            self._give(strategy, part.data, part.is_damaged, self._read_outside)
         elif isinstance(part, Broken):  # what began like an answer and is none was the file's
-            self._feed(strategy, bytes((STX,)) + part.data, is_damaged=True)
+            self._give(strategy, bytes((STX,)) + part.data, True, self._read_outside)
 
-    def _feed(self, strategy: Strategy, data: bytes, is_damaged: bool) -> None:
+    def _give(self, strategy: Strategy, data: bytes, is_damaged: bool, read: Callable[[bytes, bool], None]) -> None:
+        """Give *data* to the transfer, and have *read* what of it is another's."""
         if is_damaged:
             strategy.note_damage()
         if foreign := strategy.receive(data):
-            self._read_outside(foreign, is_damaged)
+            read(foreign, is_damaged)
+        self._events += strategy.take_notes()
 
     def _note_transfer(self) -> None:
         strategy = self._transfer
