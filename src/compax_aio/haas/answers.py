@@ -21,6 +21,7 @@ from ..escaping import shown
 from .facts.queries import BUSY, QUERIES, UNKNOWN_REQUEST, WRITE_DONE, WRITE_VARIABLE, AnswerKind, Query
 
 __all__ = [
+    "HIGHEST_VARIABLE",
     "Answer",
     "Belongs",
     "Busy",

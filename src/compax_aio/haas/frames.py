@@ -26,6 +26,7 @@ from .facts.characters import (
     SPACE,
     STX,
 )
+from .facts.queries import WRITE_DONE
 
 __all__ = ["Broken", "Echo", "Form", "Frame", "FrameSplitter", "Line", "Outside", "Part", "PrintReader", "Prompt"]
 
@@ -36,6 +37,8 @@ _LONGEST_FRAME: Final = 256
 _LONGEST_LINE: Final = 512
 _TAIL: Final = bytes([CARRIAGE_RETURN, LINE_FEED, PROMPT])
 _LINE_ENDS: Final = bytes([CARRIAGE_RETURN, LINE_FEED])
+_LEFT_OVER: Final = (bytes([PROMPT]), WRITE_DONE.encode())
+"""The end of an answer whose beginning was lost; and an answer to a write that has no frame."""
 _NOT_PRINTED: Final = frozenset({NUL, DELETE, DC1, DC2, DC3, DC4})
 """Leader, flow control, and what POPEN and PCLOS send."""
 
@@ -306,7 +309,7 @@ class PrintReader:
         """Take note that an answer stands here: an echo in front of it may have no end of its own."""
         if self._is_echo:
             return [self._finish()]
-        if self._held.strip() == bytes([PROMPT]):  # of an answer whose beginning was lost
+        if self._held.strip() in _LEFT_OVER:
             self._held.clear()
         return []
 
