@@ -17,6 +17,7 @@ from ..link.contract import Event
 from ..link.link import LinkStats
 from ..link.reconnecting import Restored
 from ..motion.events import EventHub, EventStream
+from .collecting import Collecting
 from .events import ConnectionLost, ConnectionRestored, Overheard, Printed, ReaderOff, ReaderOn
 from .facts.data_files import DataKind
 from .language.program_file import ProgramFile
@@ -29,19 +30,22 @@ from .protocol_events import Overheard as OverheardOnLine
 from .protocol_events import Printed as PrintedOnLine
 from .protocol_events import ReaderOff as ReaderOffOnLine
 from .protocol_events import ReaderOn as ReaderOnOnLine
+from .questions import Questions
 from .receiving import Receiving
 from .reports import TransferReports
 from .sending import Sending
 from .settings import ControlSettings
 from .transfer import Kind, Received, Sent, Transfer
 from .transferring import Transferring
+from .variables import VariableWriter
+from .watching import Watching
 
 __all__ = ["Control"]
 
 _log = logging.getLogger("compax_aio.haas")
 
 
-class Control:
+class Control(Questions):
     """
     One control, open; made by :func:`compax_aio.haas.connect`.
 
@@ -63,13 +67,16 @@ class Control:
             self.profile,
             settings,
             on_event=self._on_event,
-            on_lost=self._on_down,
+            on_lost=self._on_lost,
             greet=self._meet,
             on_down=self._on_down,
             on_restored=self._on_restored,
         )
         self._reports = TransferReports(name, self.profile, self._line.link)
         self._transferring: Transferring[Received] | Transferring[Sent] | None = None
+        self._collecting = Collecting(self._line, self._transfer_task)
+        self._watching = Watching(self._collecting)
+        self._writer = VariableWriter(self._collecting, self._events.publish)
 
     def __repr__(self) -> str:
         return f"<Control {self.name} {self.profile.name} {'open' if self.is_open else 'closed'}>"
@@ -264,8 +271,9 @@ class Control:
 
     def _receive(self, kind: Kind, how: HowToReceive) -> Transfer[Received]:
         manner = ReceivingManner(**how)
-        self._refuse_transfer(f"receiving the {kind}")
-        self._transferring = receiving = Receiving(self._line, kind, manner, self._events.publish)
+        after = self._before(f"receiving the {kind}")
+        publish = self._events.publish
+        self._transferring = receiving = Receiving(self._line, kind, manner, publish=publish, after=after)
         return receiving.transfer
 
     def _send_programs(
@@ -303,16 +311,21 @@ class Control:
         return self._send(kind.value, prepare, manner)
 
     def _send(self, kind: Kind, prepare: Callable[[], Prepared], manner: Manner) -> Transfer[Sent]:
-        self._refuse_transfer(f"sending the {kind}")
-        self._transferring = sending = Sending(self._line, kind, manner, prepare, self._events.publish)
+        after = self._before(f"sending the {kind}")
+        publish = self._events.publish
+        self._transferring = sending = Sending(self._line, kind, manner, prepare=prepare, publish=publish, after=after)
         return sending.transfer
 
-    def _refuse_transfer(self, what: str) -> None:
+    def _before(self, what: str) -> asyncio.Task[None] | None:
+        """Refuse a transfer that cannot be; return what has to end before another one begins."""
         if self.profile.synchronization is None:
             raise self._reports.no_files(what)
         before = self._transferring
-        if before is not None and not before.task.done():
+        if before is None or before.task.done():
+            return None
+        if not before.transfer.done():
             raise self._reports.active(what, before.transfer.description)
+        return before.task
 
     # Events and life ------------------------------------------------------------------------------------------------
 
@@ -348,6 +361,7 @@ class Control:
             if self._transferring is not None and not self._transferring.task.done():
                 await self._transferring.end()
         finally:
+            self._watching.end()
             await self._line.link.close()
             self._events.end()
 
@@ -372,14 +386,23 @@ class Control:
             return
         now = self._loop.time()
         if isinstance(event, PrintedOnLine):
+            self._collecting.note_printed()
             self._events.publish(Printed(self.name, now, event.text, event.is_damaged))
         elif isinstance(event, OverheardOnLine):
             self.stats.strays += 1
+            self._collecting.note_overheard()
             self._events.publish(Overheard(self.name, now, event.text))
         elif isinstance(event, ReaderOnOnLine):
             self._events.publish(ReaderOn(self.name, now))
         elif isinstance(event, ReaderOffOnLine):
             self._events.publish(ReaderOff(self.name, now))
+
+    def _transfer_task(self) -> asyncio.Task[None] | None:
+        return None if self._transferring is None else self._transferring.task
+
+    def _on_lost(self, error: ConnectionLostError) -> None:
+        self._on_down(error)
+        self._watching.end(error)
 
     def _on_down(self, error: ConnectionLostError) -> None:
         self._events.publish(ConnectionLost(self.name, self._loop.time(), str(error)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from typing import Final
@@ -159,6 +160,9 @@ class ControlLine:
         self._turn = None
         try:
             outcome = await self.link.exchange(strategy.label, Lane.CONTROL, on_sent=lambda: self._take_turn(strategy))
+        except asyncio.CancelledError:
+            self.give_up(strategy)
+            raise
         finally:
             self._turn = None
             after = line_errors_of(port)

@@ -36,6 +36,7 @@ class Receiving(Transferring[Received]):
         kind: What is expected.
         manner: How it is wanted.
         publish: Is told what happens.
+        after: See :class:`Transferring`.
 
     Raises:
         InvalidCommandError: The archive can be no path.
@@ -46,10 +47,12 @@ class Receiving(Transferring[Received]):
         line: ControlLine,
         kind: Kind,
         manner: ReceivingManner,
+        *,
         publish: Callable[[DriveEvent], None],
+        after: asyncio.Task[None] | None,
     ) -> None:
         archive = None if manner.archive is None else Archive(manner.archive, kind)
-        super().__init__(line, kind, "receive", manner, publish)
+        super().__init__(line, kind, "receive", manner, publish=publish, after=after)
         self._archive = archive
         self._accepts_damage = manner.accept_damaged
 

@@ -33,6 +33,7 @@ class Sending(Transferring[Sent]):
         manner: How it is wanted.
         prepare: Makes it ready, in a thread; raises InvalidCommandError if it may not be sent.
         publish: Is told what happens.
+        after: See :class:`Transferring`.
     """
 
     def __init__(
@@ -40,10 +41,12 @@ class Sending(Transferring[Sent]):
         line: ControlLine,
         kind: Kind,
         manner: Manner,
+        *,
         prepare: Callable[[], Prepared],
         publish: Callable[[DriveEvent], None],
+        after: asyncio.Task[None] | None,
     ) -> None:
-        super().__init__(line, kind, "send", manner, publish)
+        super().__init__(line, kind, "send", manner, publish=publish, after=after)
         self._prepare = prepare
 
     async def _carry_out(self) -> Sent:

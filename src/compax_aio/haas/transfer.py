@@ -263,6 +263,10 @@ class Transfer(asyncio.Future[_ResultT]):
         """Note that it is further, or in another phase."""
         self._changed.set()
 
+    def note_cancelled(self) -> None:
+        """Note that whoever carries it out was cancelled."""
+        super().cancel()
+
     def finish(self, result: _ResultT) -> None:
         """Note that it has ended well."""
         if not self.done():

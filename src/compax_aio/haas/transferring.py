@@ -39,7 +39,6 @@ _PHASES: Final[dict[Phase, TransferPhase]] = {
     Phase.WAIT_START: "waiting for operator",
     Phase.BODY: "under way",
     Phase.TAIL: "ending",
-    Phase.DONE: "ending",
 }
 _OUTCOMES: Final[tuple[tuple[type[BaseException], MoveOutcome], ...]] = (
     (AnswerTimeoutError, "out of time"),
@@ -58,6 +57,7 @@ class Transferring(ABC, Generic[_ResultT]):
         way: Which way.
         manner: How it is wanted.
         publish: Is told what happens.
+        after: A transfer that was given up, and has not let go of everything yet.
 
     Attributes:
         transfer: What the caller holds.
@@ -65,7 +65,14 @@ class Transferring(ABC, Generic[_ResultT]):
     """
 
     def __init__(
-        self, line: ControlLine, kind: Kind, way: Way, manner: Manner, publish: Callable[[DriveEvent], None]
+        self,
+        line: ControlLine,
+        kind: Kind,
+        way: Way,
+        manner: Manner,
+        *,
+        publish: Callable[[DriveEvent], None],
+        after: asyncio.Task[None] | None,
     ) -> None:
         self.kind = kind
         self.way = way
@@ -73,6 +80,7 @@ class Transferring(ABC, Generic[_ResultT]):
         self._manner = manner
         self._patience = line.patience(manner.operator_timeout_s, manner.silence_timeout_s)
         self._publish = publish
+        self._after = after
         self._loop = asyncio.get_running_loop()
         self._reports = TransferReports(line.name, line.profile, line.link)
         self._archive: Archive | None = None
@@ -86,7 +94,7 @@ class Transferring(ABC, Generic[_ResultT]):
         self._held_s = 0.0
         self._held_since: float | None = None
         self._began_at = self._loop.time()
-        self._is_over = False
+        self._has_begun = self._is_over = False
         self.transfer: Transfer[_ResultT] = Transfer(self, f"{way} {kind}")
         self.task = self._loop.create_task(self._run(), name=f"{line.name}: {way} {kind}")
 
@@ -110,7 +118,7 @@ class Transferring(ABC, Generic[_ResultT]):
             return "starting"
         if self._held_since is not None:
             return "held"
-        return _PHASES[self._strategy.phase]
+        return _PHASES[self._strategy.account().phase]  # of one that is over, that in which it ended
 
     def _on_the_line(self) -> LineAccount | None:
         if self._on_line is not None:
@@ -161,7 +169,8 @@ class Transferring(ABC, Generic[_ResultT]):
         """Deal with a transfer that was cancelled: nothing more of it is written from now on."""
         if self._strategy is not None:
             self._line.give_up(self._strategy)
-        self.task.cancel()
+        if self._has_begun:  # else it finds out when it does
+            self.task.cancel()
 
     async def end(self) -> None:
         """End it because its control is closed."""
@@ -196,10 +205,12 @@ class Transferring(ABC, Generic[_ResultT]):
 
     async def _run(self) -> None:
         result, failure = None, None
+        self._has_begun = True
         try:
+            await self._until_it_may_begin()
             result = await self._carry_out()
         except asyncio.CancelledError:
-            self.transfer.cancel()  # it may be this task that was cancelled, by a loop that ends
+            self.transfer.note_cancelled()  # it may be this task that was cancelled, by a loop that ends
         except CompaxError as error:
             failure = error
         except OSError as error:  # of the archive, or of the file that shall be sent
@@ -209,6 +220,12 @@ class Transferring(ABC, Generic[_ResultT]):
             self.transfer.fail(error)
         finally:
             await despite_cancellation(self._end(result, failure))
+
+    async def _until_it_may_begin(self) -> None:
+        if self.transfer.done():  # cancelled already
+            raise asyncio.CancelledError
+        if self._after is not None:
+            await asyncio.wait([self._after])
 
     async def _end(self, result: _ResultT | None, failure: CompaxError | None) -> None:
         self._ask_nothing()
