@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Iterable
+from functools import cached_property
 from types import TracebackType
 from typing import Self, Unpack
 
@@ -31,10 +32,9 @@ from .line import DriveLine
 from .motion import Motion
 from .moves import Move, OnCancel, PreparedMove
 from .observer import Observer
-from .parameters import VARIABLE_TABLE, NumberedValues, Parameters
+from .parts import Parts
 from .plain_line import check_line, is_query, starts_motion
 from .poller import Poller
-from .program_memory import ProgramMemory
 from .protocol import ComparatorReached, PositionReached, Stray
 from .readings import Readings
 from .settings import DriveSettings
@@ -54,18 +54,13 @@ __all__ = ["Drive"]
 _log = logging.getLogger("compax_aio.compax")
 
 
-class Drive(Readings, AxisCommands):
+class Drive(Readings, AxisCommands, Parts):
     """
     One COMPAX drive on an open line; made by :func:`compax_aio.connect`.
 
     Positions are in :attr:`unit`, counted from machine zero (P1 shifts them, UG p. 104). Every method that asks the
     drive raises AnswerTimeoutError or ConnectionLostError when no answer comes, CommandRejectedError when the answer
     is an error, UnexpectedAnswerError when it is something else.
-
-    Attributes:
-        parameters: P1-P250, read, written, saved and restored.
-        variables: V1-V39 and V50-V70, likewise.
-        program: The records N001-N250, and the program that they are.
     """
 
     def __init__(self, name: str, settings: DriveSettings) -> None:
@@ -84,10 +79,6 @@ class Drive(Readings, AxisCommands):
         super().__init__(line, Observer(line, self._on_fault))
         self._motion = Motion(self._observer, self._events.publish)
         self._identity = Identity(self._observer, self._motion)
-        self.parameters = Parameters(line)
-        self.variables = NumberedValues(line, VARIABLE_TABLE)
-        self.program = ProgramMemory(self._observer, self._motion)
-        self._poller = Poller(line, self, self.parameters, self.variables)
 
     async def _open(self, url: str) -> None:
         await self._line.link.open(url)
@@ -300,6 +291,10 @@ class Drive(Readings, AxisCommands):
             InvalidCommandError: A quantity is not known, or *interval_s* is no time; nothing was sent.
         """
         return self._poller.watch(quantities, interval_s)
+
+    @cached_property
+    def _poller(self) -> Poller:
+        return Poller(self._line, self, self.parameters, self.variables)
 
     @property
     def settings(self) -> DriveSettings:

@@ -202,7 +202,8 @@ class EventHub:
     """Passes every event to every stream; a stream that nobody holds any more is forgotten."""
 
     def __init__(self) -> None:
-        self._streams: WeakSet[EventStream] = WeakSet()
+        self._streams: WeakSet[EventStream] | None = None
+        """None as long as nobody has followed."""
         self._ended = False
 
     def stream(self) -> EventStream:
@@ -210,16 +211,18 @@ class EventHub:
         stream = EventStream()
         if self._ended:
             stream.end()
+        if self._streams is None:
+            self._streams = WeakSet()
         self._streams.add(stream)
         return stream
 
     def publish(self, event: DriveEvent) -> None:
         """Give *event* to all streams."""
-        for stream in self._streams:
+        for stream in self._streams or ():
             stream.put(event)
 
     def end(self) -> None:
         """End all streams, and those to come."""
         self._ended = True
-        for stream in self._streams:
+        for stream in self._streams or ():
             stream.end()
