@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ast
 import importlib
+import inspect
 import pkgutil
 import re
 import subprocess
@@ -45,10 +47,19 @@ def test_what_the_package_offers_is_what_it_has() -> None:
     offered = compax_aio.__all__
     assert sorted(offered) == list(offered), "in the order in which people look"
     assert len(set(offered)) == len(offered)
-    imported = {
-        name for name, value in vars(compax_aio).items() if name[0] != "_" and not isinstance(value, ModuleType)
+    assert dir(compax_aio) == offered
+    assert all(getattr(compax_aio, name).__name__ == name for name in offered)
+    assert not hasattr(compax_aio, "nothing_of_the_kind")
+
+
+def test_what_types_are_told_of_the_package_is_what_is_imported_when_it_is_asked_for() -> None:
+    source = ast.parse(inspect.getsource(compax_aio))
+    (told,) = (each for each in source.body if isinstance(each, ast.If))
+    homes = {
+        alias.name: f".{each.module}" for each in told.body if isinstance(each, ast.ImportFrom) for alias in each.names
     }
-    assert imported == set(offered)
+    assert homes == compax_aio._HOMES
+    assert {*homes, *errors.__all__} == set(compax_aio.__all__)
 
 
 def test_the_names_of_the_contract_are_offered() -> None:
@@ -74,9 +85,14 @@ def test_the_types_of_the_package_are_shipped() -> None:
 
 def test_importing_the_package_imports_nothing_that_it_does_not_need() -> None:
     """In a process of its own, for this one has imported all."""
-    code = f"import sys, compax_aio\nprint(*[name for name in {NOT_NEEDED!r} if name in sys.modules])"
+    assert imported_by("import compax_aio", [*NOT_NEEDED, "asyncio", "compax_aio.compax", "compax_aio.link"]) == []
+    assert imported_by("from compax_aio import *", NOT_NEEDED) == []
+
+
+def imported_by(statement: str, names: list[str]) -> list[str]:
+    code = f"import sys\n{statement}\nprint(*[name for name in {names!r} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
-    assert done.stdout.split() == []
+    return done.stdout.split()
 
 
 # Errors ---------------------------------------------------------------------------------------------------------------
