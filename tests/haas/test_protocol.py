@@ -329,6 +329,26 @@ def test_a_question_whose_answer_cannot_be_mistaken_is_asked_at_once_although_so
     assert protocol.bytes_to_send() == b"Q500\r\n"
 
 
+def test_what_was_asked_before_something_that_is_answered_is_owed_no_more() -> None:
+    protocol = owing("Q500")
+    protocol.send("Q201")
+    protocol.time_ran_out()
+    protocol.receive(framed("USING TOOL, 4"))
+    protocol.bytes_to_send()
+    protocol.send("Q500")
+    protocol.time_ran_out()
+    assert protocol.bytes_to_send() == b"Q500\r\n"
+
+
+def test_what_was_asked_before_something_that_is_answered_late_is_owed_no_more() -> None:
+    protocol = owing("Q500", "Q201")
+    protocol.receive(framed("USING TOOL, 4"))
+    assert told(protocol) == [LateEnding("Q201", Answered("USING TOOL, 4"))]
+    protocol.send("Q500")
+    protocol.time_ran_out()
+    assert protocol.bytes_to_send() == b"Q500\r\n"
+
+
 def test_a_question_that_is_owed_itself_is_not_asked_before_that_is_settled() -> None:
     protocol = owing("Q201")
     protocol.send("Q201")
@@ -560,6 +580,28 @@ def test_a_file_goes_out_when_the_line_was_silent_for_a_moment() -> None:
     over = only_over(protocol)
     assert (over.account.ending, over.account.bytes) == (Ending.COMPLETE, len(FILE))
     assert not protocol.in_doubt
+
+
+def test_signs_that_come_in_one_piece_let_no_more_out_than_may_wait() -> None:
+    protocol = in_step()
+    sending(protocol, data=FILE * 20)
+    protocol.time_ran_out()
+    protocol.bytes_to_send()
+    protocol.receive((DC3 + DC1) * 5)
+    assert len(protocol.bytes_to_send()) <= 16
+
+
+def test_half_an_answer_while_a_file_is_sent_is_not_joined_to_the_next_one() -> None:
+    protocol = in_step()
+    sending(protocol)
+    protocol.time_ran_out()
+    protocol.receive(b"\x02S/N, 99")
+    while protocol.is_busy:
+        protocol.bytes_to_send()
+        protocol.time_ran_out()
+    assert only_over(protocol).account.ending is Ending.COMPLETE
+    protocol.receive(b"7\x17\r\n>")
+    assert Overheard("S/N, 997") not in told(protocol)
 
 
 def test_a_file_waits_longer_when_an_answer_is_owed() -> None:

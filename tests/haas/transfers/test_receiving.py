@@ -87,9 +87,12 @@ def test_a_dc4_that_is_noise_in_the_middle_does_not_end_the_file() -> None:
     bench = Reception("dc codes")
     bench.come(DC2, SETTINGS[:9], DC4)
     bench.wait(1)
-    bench.come(SETTINGS[9:], DC4)
+    bench.come(SETTINGS[9:])
+    bench.wait(1.9)
+    assert bench.strategy.ending is None
     assert bench.wait_for_end() is Ending.COMPLETE
     assert bench.file == SETTINGS
+    assert not bench.strategy.account().has_dc4
 
 
 def test_a_file_that_dc4_ends_without_a_percent_sign_is_told_to_be_open() -> None:

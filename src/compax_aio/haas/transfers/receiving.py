@@ -113,10 +113,12 @@ class ReceiveFile(Strategy):
         self._carriage_returns += data.count(CARRIAGE_RETURN)
         self._line_feeds += data.count(LINE_FEED)
         self._file_end.read(data)
+        is_more = bool(data.strip())
+        if is_more:
+            self._has_dc4 = False  # what looked like one was noise, or it was that of another file
         if self._file_end.is_closed:
             self._enter(Phase.TAIL)
-        elif self.phase is Phase.BODY or data.strip():
-            self._has_dc4 = False  # what looked like one was noise, or it was that of another file
+        elif self.phase is Phase.BODY or is_more:
             self._enter(Phase.BODY)
         self._sink(data)
 
