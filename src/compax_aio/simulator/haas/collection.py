@@ -20,6 +20,8 @@ from .trouble import Trouble
 
 __all__ = ["Collection"]
 
+_SAME_TIME_S: Final = 1e-9
+"""Times are sums, and no more exact than that."""
 _LONGEST_REQUEST: Final = 64
 _MOST_GAPS: Final = 100_000
 _HIGHEST_VARIABLE: Final = 20_000
@@ -93,9 +95,9 @@ class Collection:
         """Take bytes, of which the first came *at*."""
         for place, byte in enumerate(data):
             if byte in {CARRIAGE_RETURN, LINE_FEED}:
-                if self._line:
-                    line = self._line.decode("latin-1")
-                    self._line.clear()
+                line = self._line.decode("latin-1")
+                self._line.clear()
+                if line.strip():
                     self._ask(line, at + place * step_s)
                 continue
             if not self._line:
@@ -128,7 +130,7 @@ class Collection:
 
     def _look_whether_it_freezes(self, gap_s: float) -> None:
         knobs = self._knobs
-        self._close_ones = self._close_ones + 1 if gap_s < knobs.freeze_gap_s else 0
+        self._close_ones = self._close_ones + 1 if gap_s < knobs.freeze_gap_s - _SAME_TIME_S else 0
         if knobs.freeze_after and self._close_ones >= knobs.freeze_after and not self._around.is_frozen:
             self._around.is_frozen = True
             self._around.note(LogKind.FROZEN, f"{self._close_ones} requests, none after {knobs.freeze_gap_s:g} s")

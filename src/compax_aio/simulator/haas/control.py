@@ -282,6 +282,10 @@ class SimulatedControl:
         self.power_off(now)
         self.power_on(now)
 
+    def freeze(self, now: float | None = None) -> None:
+        """Let it freeze, as a control did that was polled without pause: nothing is answered until RESET is pressed."""
+        self._act(now, lambda: self._if_on(self._inside.freeze))
+
     def inject(self, data: bytes, now: float | None = None) -> None:
         """Put bytes out of nothing on the line to the host, behind what is being sent."""
         self._act(now, lambda: self._inside.transmitter.send(data, self._inside.around.now))

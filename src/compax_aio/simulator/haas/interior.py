@@ -256,6 +256,12 @@ class Interior:
         self.running.reset(now)
         around.alarms.clear()
 
+    def freeze(self, now: float) -> None:
+        """Let it freeze."""
+        if not self.around.is_frozen:
+            self.around.is_frozen = True
+            self.around.note(LogKind.FROZEN, "by hand", now)
+
     def thaw(self, now: float) -> None:
         """Let a frozen control live again."""
         if self.around.is_frozen:
