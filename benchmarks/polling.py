@@ -13,13 +13,16 @@ from statistics import quantiles
 from typing import Any, Final, Self
 
 import compax_aio
-from compax_aio import Drive
+from compax_aio import Drive, DriveSettings
 from compax_aio.transports import TransportURL, open_transport
 
 from .far_ends.paced import EXCHANGE_S
 from .measuring.floor import Bare
 
-__all__ = ["Ask", "FarUsage", "Polled", "bare_lines", "drives", "percentile", "poll", "room_for"]
+__all__ = ["PATIENT", "Ask", "FarUsage", "Polled", "bare_lines", "drives", "percentile", "poll", "room_for"]
+
+PATIENT: Final = DriveSettings(answer_timeout_s=10.0)
+"""What it costs is the same; and that a machine which has other things to do is slow is no trouble of a line."""
 
 _SPARE_DESCRIPTORS: Final = 256
 
@@ -40,10 +43,11 @@ def room_for(lines: int) -> None:
 
 
 @asynccontextmanager
-async def drives(urls: Sequence[str]) -> AsyncIterator[list[Drive]]:
-    """Connect to all at once, as a user would who changes no settings, and close all."""
+async def drives(urls: Sequence[str], settings: DriveSettings | None = PATIENT) -> AsyncIterator[list[Drive]]:
+    """Connect to all at once, and close all; if one cannot be connected to, the others are closed, too."""
     names = (f"drive {number}" for number in range(len(urls)))
-    made = await asyncio.gather(*map(_connect, urls, names), return_exceptions=True)
+    connecting = (_connect(url, name, settings) for url, name in zip(urls, names, strict=True))
+    made = await asyncio.gather(*connecting, return_exceptions=True)
     connected = [each for each in made if isinstance(each, Drive)]
     try:
         for each in made:
@@ -54,8 +58,8 @@ async def drives(urls: Sequence[str]) -> AsyncIterator[list[Drive]]:
         await asyncio.gather(*(drive.close() for drive in connected))
 
 
-async def _connect(url: str, name: str) -> Drive:
-    return await compax_aio.connect(url, name=name)
+async def _connect(url: str, name: str, settings: DriveSettings | None) -> Drive:
+    return await compax_aio.connect(url, name=name, settings=settings)
 
 
 @asynccontextmanager

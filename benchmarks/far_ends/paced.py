@@ -55,6 +55,8 @@ _KNOWN: Final[Mapping[bytes, bytes]] = {
     b"S30": b"S030: 0 0\r\n>",
     b"P20": b"P020: 0\r\n>",
 }
+_MOVING: Final[Mapping[bytes, bytes]] = {b"S16": b"S016: 11100000\r\n>", b"S17": b"S017: 00100010\r\n>"}
+"""What differs while the axis moves."""
 _SAID: Final[Mapping[bytes, bytes]] = {b"S": b"0.00", b"P": b"0", b"V": b"0", b"N": b"END"}
 """What any other status, parameter, variable or record is."""
 _MOVE_S: Final = (0.02, 0.08)
@@ -83,7 +85,7 @@ def _answer(line: bytes) -> bytes:
 class _Connection:
     """One who has connected to a line."""
 
-    __slots__ = ("descriptor", "entry", "heard_until", "line", "said_at", "said_until", "sock", "turn")
+    __slots__ = ("descriptor", "entry", "heard_until", "line", "move_ends_at", "said_at", "said_until", "sock")
 
     def __init__(self, line: int, descriptor: int, sock: socket.socket | None = None) -> None:
         self.line = line
@@ -94,8 +96,8 @@ class _Connection:
         self.entry = b""
         self.heard_until = self.said_until = self.said_at = 0.0
         """When the last byte has come, will have gone, and was released."""
-        self.turn = 0
-        """Counts stops: a move of an earlier turn has no end."""
+        self.move_ends_at: float | None = None
+        """None while the axis stands; a stop ends a move without ``$``."""
 
 
 def _read(connection: _Connection) -> tuple[bytes, float]:
@@ -153,6 +155,7 @@ class PacedLines:
         self._lateness = Lateness()
         self._messages: list[tuple[int, float]] = []
         self._stops: list[tuple[int, float, float]] = []
+        self._stalled: set[int] = set()
         self._lines = 0
         self._is_wanted = True
 
@@ -184,7 +187,8 @@ class PacedLines:
 
     def _connected(self, connection: _Connection) -> None:
         self._connections[connection.descriptor] = self._at_line[connection.line] = connection
-        self._epoll.register(connection.descriptor, select.EPOLLIN)
+        if connection.line not in self._stalled:
+            self._epoll.register(connection.descriptor, select.EPOLLIN)
 
     def _disconnected(self, connection: _Connection) -> None:
         del self._connections[connection.descriptor]
@@ -215,8 +219,10 @@ class PacedLines:
             wait_s = due[0][0] - begun_at - _EARLY_S if due else None
             if wait_s is None or wait_s > 0:
                 select.select((self._epoll,), (), (), wait_s)
+            woken_at = clock()
+            self._idle_s += woken_at - begun_at
             if not self._read_all() | self._release_all():
-                self._idle_s += clock() - begun_at
+                self._idle_s += clock() - woken_at
 
     def _read_all(self) -> bool:
         ready = self._epoll.poll(0)
@@ -257,8 +263,9 @@ class PacedLines:
         for line in lines:
             if line == b"STOP":
                 self._stops.append((connection.line, came_at, connection.said_at))
-                connection.turn += 1
-            self._say(connection, _answer(line), connection.heard_until + ANSWER_TIME_S)
+                connection.move_ends_at = None
+            said = _MOVING.get(line) if connection.move_ends_at is not None else None
+            self._say(connection, said or _answer(line), connection.heard_until + ANSWER_TIME_S)
             if line.startswith(b"PA") and line.endswith(b"$"):
                 self._begin_move(connection)
 
@@ -276,21 +283,19 @@ class PacedLines:
             return
         self._lateness.note(now - at)
         connection.said_at = now
-        if data is _MESSAGE or (self._by_byte and data == _MESSAGE[:1]):
+        if data is _MESSAGE:
             self._messages.append((connection.line, now))
         with contextlib.suppress(OSError):  # nobody takes it, or there is nobody any more: so does a wire lose it
             os.write(connection.descriptor, data)
 
     def _begin_move(self, connection: _Connection) -> None:
-        """Let a move of this turn end some time after its acknowledgement; nothing to be said stands for that."""
-        until = connection.said_until + self._random.uniform(*_MOVE_S)
-        turn = connection.turn
-        moving = _Connection(connection.line, turn)
-        self._push(until, moving, b"")
+        """Let a move end some time after its acknowledgement; nothing to be released stands for that."""
+        connection.move_ends_at = connection.said_until + self._random.uniform(*_MOVE_S)
+        self._push(connection.move_ends_at, connection, b"")
 
-    def _end_move(self, moving: _Connection, at: float) -> None:
-        connection = self._at_line[moving.line]
-        if connection.turn == moving.descriptor:
+    def _end_move(self, connection: _Connection, at: float) -> None:
+        if connection.move_ends_at == at:
+            connection.move_ends_at = None
             self._say(connection, _MESSAGE, at)
 
     # What who measures asks -----------------------------------------------------------------------------------------
@@ -308,19 +313,25 @@ class PacedLines:
         """
         Tell what happened since the last time, by CLOCK_MONOTONIC, which all processes share.
 
-        ``messages``: line, and when its ``$`` was about to be written. ``stops``: line, when all of STOP had come, and
-        when the last byte of the answer before it was about to be written.
+        ``messages``: line, and when its ``$`` was about to be written, unless ``--by-byte``. ``stops``: line, when all
+        of STOP had come, and when the last byte of the answer before it was about to be written.
         """
         messages, self._messages = self._messages, []
         stops, self._stops = self._stops, []
         return {"messages": messages, "stops": stops}
 
     def stall(self, line: str) -> object:
-        """Read nothing from a line any more, and say nothing on it; who connects to it again finds it well."""
+        """Read nothing from a line any more and say nothing on it, whoever connects to it, until :meth:`mend`."""
         connection = self._at_line[int(line)]
+        self._stalled.add(connection.line)
         self._epoll.unregister(connection.descriptor)
         self._due[:] = [each for each in self._due if each[2] is not connection]
         heapq.heapify(self._due)
+        return True
+
+    def mend(self, line: str) -> object:
+        """Serve whoever connects to that line from now on."""
+        self._stalled.discard(int(line))
         return True
 
 
@@ -335,6 +346,7 @@ class _Asked:
             "usage": lines.usage,
             "happened": lines.happened,
             "stall": lines.stall,
+            "mend": lines.mend,
         }
 
     def read(self) -> None:

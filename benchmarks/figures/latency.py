@@ -122,7 +122,7 @@ async def _all_the_while(*awaitables: Awaitable[None]) -> AsyncIterator[None]:
 @asynccontextmanager
 async def _stalled_neighbour(far: FarEnd, line: int) -> AsyncIterator[None]:
     """Connect to one more drive, let its line stall, and have somebody ask it all the while."""
-    impatient = DriveSettings(answer_timeout_s=0.1, reconnect_first_s=0.05, reconnect_slowest_s=0.2, stop_timeout_s=1)
+    impatient = DriveSettings(answer_timeout_s=0.5, reconnect_first_s=0.05, reconnect_slowest_s=0.2, stop_timeout_s=1)
     drive = await compax_aio.connect(far.where["tcp"][line], name="the neighbour", settings=impatient)
     try:
         far.ask(f"stall {line}")
@@ -131,6 +131,7 @@ async def _stalled_neighbour(far: FarEnd, line: int) -> AsyncIterator[None]:
     finally:
         with contextlib.suppress(CompaxError):
             await drive.close()
+        far.ask(f"mend {line}")
 
 
 @asynccontextmanager
@@ -192,9 +193,11 @@ class _BareMover(asyncio.Protocol):
 
 
 async def _keep_moving(line: int, mover: _BareMover, until: float, reached: list[Event]) -> None:
-    while time.monotonic() < until:
+    while True:
         await mover.move()
         reached.append((line, time.monotonic()))
+        if time.monotonic() >= until:
+            return
 
 
 async def _measure_floor(far: FarEnd, lines: int, round_s: float) -> list[float]:
@@ -227,10 +230,12 @@ def _names() -> list[str]:
 
 async def _stop_again_and_again(line: int, drive: Drive, until: float, called: list[Event]) -> None:
     random = Random(line)
-    while time.monotonic() < until:
+    while True:
         await asyncio.sleep(random.uniform(*_PAUSE_S))
         called.append((line, time.monotonic()))
         await drive.stop()
+        if time.monotonic() >= until:
+            return
 
 
 async def _measure_stops(far: FarEnd, stopped: Mapping[int, Drive], round_s: float) -> tuple[list[float], list[float]]:

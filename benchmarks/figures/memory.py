@@ -19,6 +19,7 @@ import tracemalloc
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager, AsyncExitStack
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
@@ -32,7 +33,7 @@ __all__ = ["DRIVES", "FLOOR", "main", "measure"]
 DRIVES: Final = "drives"
 FLOOR: Final = "floor"
 _WHO: Final[Mapping[str, Callable[[Sequence[str]], AbstractAsyncContextManager[list[Any]]]]] = {
-    DRIVES: drives,
+    DRIVES: partial(drives, settings=None),
     FLOOR: bare_lines,
 }
 
