@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
-from compax_aio.haas.facts.data_files import DataKind
 from compax_aio.simulator.haas import Knobs, LogKind, SimulatedControl
 
 __all__ = ["ACK", "EOT", "NAK", "XOFF", "XON", "Host", "block"]
@@ -23,15 +21,16 @@ def block(number: int, data: bytes) -> bytes:
 class Host:
     """A control with *knobs*, and the time, which begins at 0 and goes on with every call."""
 
-    def __init__(self, *, n0: int | None = None, **knobs: Any) -> None:
-        def checksum(kind: DataKind, values: Mapping[int, str]) -> int:
-            del kind, values
-            return n0 or 0
-
-        self.control = (
-            SimulatedControl(Knobs(**knobs)) if n0 is None else SimulatedControl(Knobs(**knobs), checksum=checksum)
-        )
+    def __init__(self, **knobs: Any) -> None:
+        self.control = SimulatedControl(Knobs(**knobs))
         self.now = 0.0
+
+    @classmethod
+    def whose_n0_is(cls, value: int, **knobs: Any) -> Host:
+        """Return one whose control has the same N0 for all data."""
+        host = cls(**knobs)
+        host.control = SimulatedControl(host.control.knobs, checksum=lambda _kind, _values: value)
+        return host
 
     def wait(self, seconds: float = 0.0) -> bytes:
         """Let time pass; return what comes out meanwhile."""

@@ -1,4 +1,4 @@
-"""The byte vectors of the fact sheet (§12), the codes of Haas 11596-8000, and the traces of §7, from the control's side."""
+"""The byte vectors of the fact sheet (§12), the codes of Haas 11596-8000, the traces of §7: the control's side."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def test_the_serial_number_comes_as_printed() -> None:
 
 
 def test_dc_codes_surround_what_is_sent() -> None:
-    host = Host(profile="dc codes", n0=12345)
+    host = Host.whose_n0_is(12345, profile="dc codes")
     host.control.memory.settings.clear()
     host.control.memory.settings[1] = "100"
     assert host.fetch("settings") == b"\x12" + _DATA + b"\x14"
@@ -43,7 +43,7 @@ def test_dc_codes_surround_what_is_sent() -> None:
 
 
 def test_dc_codes_surround_what_is_received() -> None:
-    host = Host(profile="dc codes", n0=12345)
+    host = Host.whose_n0_is(12345, profile="dc codes")
     assert host.receive("settings") == b"\x11"
     assert host.send(_DATA) == b"\x13"
     assert host.control.screen == "RS232 DONE"
@@ -52,7 +52,7 @@ def test_dc_codes_surround_what_is_received() -> None:
 
 
 def test_the_reader_is_off_as_soon_as_the_last_percent_has_come() -> None:
-    host = Host(profile="dc codes", baudrate=9600, n0=12345)
+    host = Host.whose_n0_is(12345, profile="dc codes", baudrate=9600)
     assert host.receive("settings") == b""
     assert host.wait(0.01) == b"\x11"
     sent_at = host.now

@@ -1,6 +1,8 @@
-"""DNC of a simulated control: blocks are executed as they come, nothing is stored, and the line waits for the machine."""
+"""DNC of a simulated control: blocks are executed as they come, nothing is stored, the line waits for the machine."""
 
 from __future__ import annotations
+
+from itertools import pairwise
 
 import pytest
 from tests.simulator.haas.host import XOFF, XON, Host
@@ -43,7 +45,7 @@ def test_the_line_waits_for_the_machine() -> None:
     assert signs == (XOFF + XON) * (len(signs) // 2)
     assert len(signs) >= 10
     at = [each.at for each in host.control.log if each.kind is LogKind.EXECUTED]
-    assert [b - a for a, b in zip(at[:-1], at[1:], strict=True)] == pytest.approx([0.2] * 99, abs=1e-6)
+    assert [b - a for a, b in pairwise(at)] == pytest.approx([0.2] * 99, abs=1e-6)
     assert host.now == pytest.approx(20.0, abs=0.2)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -32,7 +34,7 @@ def _read(pieces: list[bytes], eob: EobPattern) -> tuple[list[bytes], int, bool]
 )
 def test_pieces_make_no_difference(data: bytes, cuts: list[int], eob: EobPattern) -> None:
     places = [0, *sorted(min(cut, len(data)) for cut in cuts), len(data)]
-    pieces = [data[begin:end] for begin, end in zip(places[:-1], places[1:], strict=True)]
+    pieces = [data[begin:end] for begin, end in pairwise(places)]
     whole, taken, is_ended = _read([data], eob)
     in_pieces, taken_in_pieces, is_ended_in_pieces = _read(pieces, eob)
     assert (in_pieces, is_ended_in_pieces) == (whole, is_ended)

@@ -36,10 +36,7 @@ def test_a_file_is_received() -> None:
 def test_it_says_nak_every_second_until_somebody_begins() -> None:
     host = Host(profile="xmodem", baudrate=115200)
     assert host.receive() == b""
-    times = []
-    for _ in range(450):
-        if host.wait(0.01) == NAK:
-            times.append(host.now)
+    times = [host.now for _ in range(450) if host.wait(0.01) == NAK]
     assert times == pytest.approx([0.01, 1.01, 2.01, 3.01, 4.01], abs=0.005)
     host.send(block(1, _BLOCKS[0]))
     assert host.wait(0.1) == ACK

@@ -23,6 +23,8 @@ __all__ = ["Collection"]
 _SAME_TIME_S: Final = 1e-9
 """Times are sums, and no more exact than that."""
 _LONGEST_REQUEST: Final = 64
+_MOST_UNANSWERED: Final = 4096
+"""Bytes of answers that wait; while there are more, requests are not heard."""
 _MOST_GAPS: Final = 100_000
 _HIGHEST_VARIABLE: Final = 20_000
 _SYSTEM_VARIABLES: Final = range(1000, 10_000)
@@ -114,7 +116,7 @@ class Collection:
         quiet = "" if gap_s == inf else f" after {gap_s:.3g} s"
         around.note(LogKind.REQUEST, f"{line}{quiet}", now)
         self._look_whether_it_freezes(gap_s)
-        if around.is_frozen:
+        if around.is_frozen or self._transmitter.pending_bytes > _MOST_UNANSWERED:
             return
         if self._is_first_lost:
             self._is_first_lost = False

@@ -276,8 +276,7 @@ class Interior:
         if self.operation is not None:
             self.operation.abort(now)
             self.operation = None
-        self.transmitter.abort(now)
-        self.transmitter.release(now)
+        self.transmitter.cut()
         self.around.note(LogKind.POWER, "off", now)
         self.around.is_on = False
 

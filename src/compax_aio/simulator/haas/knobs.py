@@ -67,7 +67,7 @@ class Knobs:
     # Settings
 
     baudrate: Literal[0, 50, 110, 200, 300, 600, 1200, 2400, 4800, 7200, 9600, 19200, 38400, 115200] = 0
-    """Setting 11: byte timing of both directions; 0: bytes take no time."""
+    """Setting 11: byte timing of both directions; 0: bytes take no time, so that no host can stop what is sent."""
     parity: Annotated[str, _Word(_PROFILE, *Parity)] = _PROFILE
     """Setting 12."""
     stop_bits: Literal["profile", 1, 2] = "profile"

@@ -43,6 +43,7 @@ class Transmitter:
 
     Attributes:
         is_held: The host has stopped it.
+        pending_bytes: Data that has not left.
     """
 
     def __init__(self, byte_time_s: float, latency_bytes: int, form: Callable[[bytes], bytes]) -> None:
@@ -52,21 +53,27 @@ class Transmitter:
         self._pending: deque[_Piece] = deque()
         self._committed: deque[_Committed] = deque()
         self._free_at = 0.0
+        self._tail_at: float | None = None
         self._out = bytearray()
         self.is_held = False
+        self.pending_bytes = 0
 
     # What is sent
 
     def send(self, data: bytes, not_before: float) -> None:
         """Send data behind what is being sent."""
         if data:
+            if self._tail_at is not None:
+                self._tail_at = max(self._tail_at, not_before) + len(data) * self._byte_time_s
             self._pending.append(_Piece(data, 0, not_before))
+            self.pending_bytes += len(data)
 
     def sign(self, data: bytes, now: float) -> None:
         """Send a sign ahead of all data, though the host has stopped it."""
         self._run(now)
         self._commit_begun(now, 0)
         begins_at = max(now, self._committed[-1].ends_at if self._committed else now)
+        self._tail_at = None
         self._free_at = begins_at + len(data) * self._byte_time_s
         self._committed.append(_Committed(data, self._free_at))
 
@@ -74,6 +81,7 @@ class Transmitter:
         """Stop, as the host wishes."""
         self._run(now)
         if not self.is_held:
+            self._tail_at = None
             self._commit_begun(now, self._latency_bytes)
             self.is_held = True
 
@@ -82,15 +90,26 @@ class Transmitter:
         self._run(now)
         if self.is_held:
             self.is_held = False
+            self._tail_at = None
             self._free_at = max(self._free_at, now)
 
     def abort(self, now: float) -> int:
         """Drop what has not begun; returns how many bytes that were."""
         self._run(now)
         self._commit_begun(now, 0)
-        dropped = sum(len(piece.data) - piece.place for piece in self._pending)
+        dropped, self.pending_bytes = self.pending_bytes, 0
         self._pending.clear()
+        self._tail_at = None
         return dropped
+
+    def cut(self) -> None:
+        """Lose everything that is not out, with the byte under way."""
+        self._pending.clear()
+        self._committed.clear()
+        self.pending_bytes = 0
+        self._tail_at = None
+        self._free_at = 0.0
+        self.is_held = False
 
     # What has come out
 
@@ -99,17 +118,12 @@ class Transmitter:
         """When all is out; infinite while the host has stopped it."""
         if self._pending and self.is_held:
             return inf
-        at = self._free_at
-        for piece in self._pending:
-            at = max(at, piece.not_before) + (len(piece.data) - piece.place) * self._byte_time_s
-        return at
-
-    @property
-    def pending_bytes(self) -> int:
-        """What has not left."""
-        return sum(len(piece.data) - piece.place for piece in self._pending) + sum(
-            len(each.data) for each in self._committed
-        )
+        if self._tail_at is None:
+            at = self._free_at
+            for piece in self._pending:
+                at = max(at, piece.not_before) + (len(piece.data) - piece.place) * self._byte_time_s
+            self._tail_at = at
+        return self._tail_at
 
     def take(self, until: float) -> bytes:
         """Return what has come out."""
@@ -141,6 +155,7 @@ class Transmitter:
                 break
             self._leave(piece.data[piece.place : piece.place + count])
             piece.place += count
+            self.pending_bytes -= count
             self._free_at = begins_at + count * self._byte_time_s
             if piece.place < len(piece.data):
                 break
@@ -167,6 +182,7 @@ class Transmitter:
             data = piece.data[piece.place : piece.place + count]
             self._committed.append(_Committed(data, self._free_at))
             piece.place += count
+            self.pending_bytes -= count
             break
         if self._pending and self._pending[0].place == len(self._pending[0].data):
             self._pending.popleft()
