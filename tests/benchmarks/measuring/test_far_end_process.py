@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import socket
 import textwrap
+import time
 from pathlib import Path
 
 import pytest
@@ -75,10 +76,12 @@ def test_a_far_end_that_ends_at_once_is_an_error(tmp_path: Path, monkeypatch: py
 
 def test_a_far_end_that_does_not_end_is_killed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("benchmarks.measuring.far_end_process._GRACE_S", 0.05)
-    module = _module(tmp_path, monkeypatch, "import time; print('{}', flush=True); time.sleep(600)")
+    module = _module(tmp_path, monkeypatch, "import time; print('{}', flush=True); time.sleep(60)")
+    begun_at = time.monotonic()
     with far_end(module) as far:
         pid = far.pid
     assert _has_ended(pid)
+    assert time.monotonic() - begun_at < 50, "it has ended by itself"
 
 
 def test_a_far_end_answers_questions_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
