@@ -58,6 +58,19 @@ def test_a_file_is_received_without_the_fill_of_its_last_block() -> None:
     assert bench.notes == [TransferBegan("receive")]
 
 
+def test_a_byte_too_many_behind_a_block_counts_as_damage_of_it() -> None:
+    bench = Reception()
+    for index in range(1, BLOCKS + 1):
+        bench.come(block(PROGRAM, index))
+        if index == 2:
+            bench.come(b"\x5a")
+        bench.wait(0.2)
+    bench.come(EOT)
+    assert bench.wait_for_end(within_s=1) is Ending.COMPLETE
+    account = bench.strategy.account()
+    assert (account.damage_offsets, account.damaged_bytes) == ((128,), 1)
+
+
 def test_the_end_comes_over_only_with_what_is_sure_not_to_be_fill() -> None:
     bench = Reception()
     bench.come(block(PROGRAM, 1))

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Final
 
+from ..facts.xmodem import BLOCK_BYTES
 from ..xmodem import Failure, FailureKind, ReceiverTimes, SenderTimes, XmodemReceiver, XmodemSender
 from .account import Ending, LineAccount, Phase
 from .framing import FileEnd
@@ -114,6 +115,9 @@ class ReceiveByXmodem(Strategy):
             lines=self._line_ends // self._eob.count(self._eob[-1:]),
             blocks=engine.blocks,
             repeated_blocks=engine.repeats,
+            # A byte came twice in it, perhaps, and its sum happened to fit: where in it, nobody knows.
+            damage_offsets=tuple((number - 1) * BLOCK_BYTES for number in engine.doubtful_blocks),
+            damaged_bytes=len(engine.doubtful_blocks),
             is_closed=self._file_end.is_closed,
             dropped_bytes=engine.fill_bytes,
             detail=_detail_of(engine.failure),
