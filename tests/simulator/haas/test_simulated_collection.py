@@ -340,3 +340,13 @@ def test_requests_without_end_find_a_limit() -> None:
     host.send(b"\x13" + b"Q201\r" * 10_000)
     assert 4096 < len(host.send(b"\x11")) < 4200
     assert host.send(b"Q201\r") == _framed("USING TOOL, 4")
+
+
+def test_it_may_freeze_by_hand() -> None:
+    host = Host()
+    host.control.freeze(host.now)
+    host.control.freeze(host.now)
+    assert host.send(b"Q201\r") == b""
+    assert host.texts(LogKind.FROZEN) == ["by hand"]
+    host.control.press_reset(host.now)
+    assert host.send(b"Q201\r")

@@ -287,3 +287,33 @@ def test_signs_have_a_parity_bit_too() -> None:
     assert host.texts(LogKind.FLOW) == ["host Xoff"]
     host.send(bytes([0x91]))
     assert host.texts(LogKind.FLOW) == ["host Xoff", "host Xon"]
+
+
+@pytest.mark.parametrize("profile", ["classic", "dc codes", "rts/cts"])
+def test_a_host_that_was_stopped_at_the_end_may_go_on_unless_the_reader_is_off(profile: str) -> None:
+    host = Host(profile=profile, baudrate=9600, take_bytes_s=200.0)
+    host.receive()
+    host.wait(1.0)
+    out = host.send(b"%\r\nO00001\r\n" + b"G0 X1.\r\n" * 12 + b"%\r\n" + b"\r\n" * 75)
+    out += host.until_quiet()
+    assert host.control.screen == "RS232 DONE"
+    last = [each.text for each in host.control.log if each.kind in {LogKind.CODE, LogKind.FLOW}][-2:]
+    if profile == "classic":
+        assert out == XOFF + XON
+    elif profile == "dc codes":
+        assert out == XOFF + XOFF
+        assert last == ["Xoff", "DC3"]
+    else:
+        assert last == ["pin 4 low", "pin 4 high"]
+    assert host.control.is_pin4_high
+    assert host.control.buffered_bytes == 0
+
+
+def test_what_a_host_sends_while_the_control_does_is_lost() -> None:
+    host = Host(baudrate=9600)
+    host.control.press_send("O00010", host.now)
+    host.wait(0.05)
+    host.send(b"Q100\r\n", 0.05)
+    assert host.control.doing == "sending O00010"
+    assert host.control.lost_bytes == 6
+    assert b"S/N" not in host.until_quiet()
