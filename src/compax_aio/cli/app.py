@@ -25,7 +25,8 @@ _MORE: Final = Group("More", sort_key=7)
 app = App(
     name="compax",
     help="""\
-Move Parker Hauser COMPAX servo drives and AMS SMC steppers, and cut on Roland CAMM-1 cutters, from the terminal.
+Move Parker Hauser COMPAX servo drives and AMS SMC steppers, cut on Roland CAMM-1 cutters, and exchange programs with
+Haas CNC controls, from the terminal.
 
 Every command takes the URL of a line: serial:///dev/ttyUSB0, tcp://192.168.1.50:4001, sim://compax. Begin with
 `compax ports`, then `compax probe URL`, which moves nothing.
@@ -57,6 +58,7 @@ _COMMANDS: Final = (
     (_SIMULATE, "demo", "demo:demo", "Home and move three simulated drives at once."),
     (_MORE, "smc", "smc:app", "AMS SMC steppers: scan, status, move, stop, programs."),
     (_MORE, "camm1", "camm1:app", "Roland CAMM-1 cutters: cut, check, preview, info."),
+    (_MORE, "haas", "haas:app", "Haas CNC controls: receive, send, check, diff, query, watch."),
 )
 
 _ROOM: Final = "compax_aio.cli"

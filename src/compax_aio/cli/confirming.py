@@ -12,7 +12,7 @@ from compax_aio import InvalidCommandError
 from .keyboard import forget_typed
 from .printing import notes_console
 
-__all__ = ["confirm", "expect_somebody"]
+__all__ = ["answer_to", "confirm", "expect_somebody"]
 
 _LONGEST: Final = 1024
 
@@ -30,6 +30,11 @@ def expect_somebody(*, yes: bool) -> None:
 
 async def confirm(question: str) -> bool:
     """Ask a question that is answered by y or n; everything else, and the end of the input, is a no."""
+    return (await answer_to(f"{question} [y/N]")).lower() in {"y", "yes"}
+
+
+async def answer_to(question: str) -> str:
+    """Ask a question, and return the line that is typed, without blanks around it; the end of the input is empty."""
     loop, descriptor = asyncio.get_running_loop(), sys.stdin.fileno()
     answer: asyncio.Future[bytes] = loop.create_future()
 
@@ -39,10 +44,10 @@ async def confirm(question: str) -> bool:
             answer.set_result(os.read(descriptor, _LONGEST))
 
     forget_typed()  # nobody has answered what was not asked yet
-    notes_console().print(f"{question} [y/N] ", end="", markup=False)
+    notes_console().print(f"{question} ", end="", markup=False)
     loop.add_reader(descriptor, take)
     try:
         said = await answer
     finally:
         loop.remove_reader(descriptor)
-    return said.strip().lower() in {b"y", b"yes"}
+    return said.decode("utf-8", "replace").strip()

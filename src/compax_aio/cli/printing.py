@@ -135,8 +135,9 @@ def _error_document(error: BaseException) -> dict[str, Any]:
     if isinstance(error, CompaxError):
         for name in ("what", "device", "sent", "received", "hint", "code", "exchanges"):
             told[name] = as_json(getattr(error, name))
-    if (job := getattr(error, "job", None)) is not None:  # what is known of a job of a cutter
-        told["job"] = as_json(job)
+    for name in ("job", "transfer"):  # what is known of a job of a cutter, of a transfer of a control
+        if (account := getattr(error, name, None)) is not None:
+            told[name] = as_json(account)
     if isinstance(error, OSError) and error.filename is not None:
         told["file"] = str(Path(error.filename))
     told["notes"] = list(getattr(error, "__notes__", ()))

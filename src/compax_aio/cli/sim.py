@@ -17,6 +17,7 @@ from compax_aio.errors import InvalidCommandError
 from compax_aio.simulator.camm1 import Knobs as CutterKnobs
 from compax_aio.simulator.compax import Knobs
 from compax_aio.simulator.far_end import FarEnd
+from compax_aio.simulator.haas import Knobs as ControlKnobs
 from compax_aio.simulator.knob_descriptions import describe_knobs
 from compax_aio.simulator.planned_faults import ANY_CODE, FAULT_KINDS
 from compax_aio.simulator.smc import Knobs as LineKnobs
@@ -24,7 +25,7 @@ from compax_aio.simulator.smc import Knobs as LineKnobs
 from .exit_codes import OK
 from .interruption import moves_nothing
 from .printing import Printing
-from .simulating.devices import Device, Faults, Place, cutters, drives, lines
+from .simulating.devices import Device, Faults, Place, controls, cutters, drives, lines
 from .simulating.hands import Hands
 from .simulating.prompt import listen, pasted_above_prompt
 from .simulating.view import SimView
@@ -45,7 +46,7 @@ standard input, and read `--json`.
 KnobWords = Annotated[str, Parameter(help="KNOB=VALUE …; `compax sim knobs` lists them.")]
 Quiet = Annotated[bool, Parameter(negative=(), help="Do not show what the far end sees.")]
 
-_KINDS: Final[Mapping[str, type]] = {"compax": Knobs, "smc": LineKnobs, "camm1": CutterKnobs}
+_KINDS: Final[Mapping[str, type]] = {"compax": Knobs, "smc": LineKnobs, "camm1": CutterKnobs, "haas": ControlKnobs}
 
 
 @app.command(name="compax")
@@ -113,6 +114,31 @@ async def serve_camm1(
     return await _serve(cutters(knobs, place, faults.seed), place, faults, printing, is_quiet=quiet, look="camm1 info")
 
 
+@app.command(name="haas")
+@moves_nothing
+async def serve_haas(
+    *knobs: KnobWords,
+    quiet: Quiet = False,
+    place: Place = Place(),  # noqa: B008 - it is frozen
+    faults: Faults = Faults(),  # noqa: B008 - it is frozen
+    printing: Printing = Printing(),  # noqa: B008 - it is frozen
+) -> int:
+    """
+    Serve a Haas CNC control, or several.
+
+    Type `send O00010`, `send ALL`, `recv`, `recv settings`, `dnc`, `cycle start`, `dprnt TEXT` or `reset` to press its
+    keys; `memory`, `alarms` and `where` show what only its screen shows.
+
+    ```sh
+    compax sim haas baudrate=9600
+    compax sim haas profile=dc_codes baudrate=9600 --link /tmp/mill
+    compax sim haas press=send:O00010,recv press_again=1 --tcp 4001
+    ```
+    """
+    served = controls(knobs, place, faults.seed)
+    return await _serve(served, place, faults, printing, is_quiet=quiet, look="haas query")
+
+
 async def _serve(
     devices: dict[str, Device], place: Place, faults: Faults, printing: Printing, *, is_quiet: bool, look: str
 ) -> int:
@@ -162,7 +188,7 @@ async def _until_end(hands: Hands, printing: Printing, *, is_conversation: bool)
 @app.command
 @moves_nothing
 def knobs(
-    kind: Annotated[str, Parameter(help="compax, smc or camm1")],
+    kind: Annotated[str, Parameter(help="compax, smc, camm1 or haas")],
     *,
     printing: Printing = Printing(),  # noqa: B008 - it is frozen
 ) -> None:
@@ -173,6 +199,7 @@ def knobs(
     compax sim knobs compax
     compax sim knobs smc
     compax sim knobs camm1
+    compax sim knobs haas
     ```
     """
     if kind not in _KINDS:

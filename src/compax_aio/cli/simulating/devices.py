@@ -18,6 +18,9 @@ from compax_aio.simulator.camm1 import SimulatedCutter
 from compax_aio.simulator.compax import Knobs, SimulatedDrive
 from compax_aio.simulator.compax.log import LogEntry
 from compax_aio.simulator.far_end import FarEnd
+from compax_aio.simulator.haas import Knobs as ControlKnobs
+from compax_aio.simulator.haas import LogEntry as ControlLogEntry
+from compax_aio.simulator.haas import SimulatedControl
 from compax_aio.simulator.outlet import Outlet, pty_outlet, tcp_outlet
 from compax_aio.simulator.planned_faults import read_faults
 from compax_aio.simulator.server import kept, state_files
@@ -27,10 +30,10 @@ from compax_aio.simulator.smc.log import LogEntry as LineLogEntry
 
 from ..number_words import WHOLE
 
-__all__ = ["Device", "Entry", "Faults", "Place", "cutters", "drives", "lines", "query_of"]
+__all__ = ["Device", "Entry", "Faults", "Place", "controls", "cutters", "drives", "lines", "query_of"]
 
-Device = SimulatedDrive | SimulatedPartyLine | SimulatedCutter
-Entry = LogEntry | LineLogEntry | CutterLogEntry
+Device = SimulatedDrive | SimulatedPartyLine | SimulatedCutter | SimulatedControl
+Entry = LogEntry | LineLogEntry | CutterLogEntry | ControlLogEntry
 
 _LAST_PORT: Final = 65_535
 _MOST_DEVICES: Final = 64
@@ -138,6 +141,12 @@ def cutters(knobs: Sequence[str], place: Place, seed: int) -> dict[str, Device]:
     """Make CAMM-1 cutters, by name; *seed* is also theirs if no knob says another; raises InvalidCommandError."""
     query = {"seed": str(seed), **query_of(knobs)}
     return {name: SimulatedCutter(_read(CutterKnobs.from_query, query), name=name) for name in place.names("cutter")}
+
+
+def controls(knobs: Sequence[str], place: Place, seed: int) -> dict[str, Device]:
+    """Make Haas controls, by name; *seed* is also theirs if no knob says another; raises InvalidCommandError."""
+    query = {"seed": str(seed), **query_of(knobs)}
+    return {name: SimulatedControl(_read(ControlKnobs.from_query, query), name=name) for name in place.names("control")}
 
 
 def query_of(knobs: Sequence[str]) -> dict[str, str]:

@@ -9,9 +9,10 @@ from compax_aio.errors import CompaxError, InvalidCommandError
 from compax_aio.simulator.camm1 import SimulatedCutter
 from compax_aio.simulator.compax import SimulatedDrive
 from compax_aio.simulator.far_end import FarEnd
+from compax_aio.simulator.haas import SimulatedControl
 from compax_aio.simulator.planned_faults import FAULT_KINDS, FaultKind, duration_s, kind_named
 
-from . import panel
+from . import control_panel, panel
 
 __all__ = ["HELP", "Hands", "known_words"]
 
@@ -34,6 +35,7 @@ cut                        the line is cut, and is there again at once
 fault 55, E55, estop       the drive has a fault; 55 is the emergency stop
 heal                       ends all of that; a fault of the drive is for QUIT to acknowledge
 {panel.HELP}
+{control_panel.HELP}
 where                      how every device stands
 urls                       where programs find them
 quit                       ends service, as Ctrl-C does
@@ -43,7 +45,18 @@ A name in front, as in `x2 silent`, means that device alone."""
 def known_words() -> tuple[str, ...]:
     """Return the words that begin a command."""
     kinds = (kind.name for kind in FAULT_KINDS)
-    return (*kinds, *_SHORT_FORMS, *panel.PANEL_WORDS, "fault", "heal", "where", "urls", "help", "quit")
+    return (
+        *kinds,
+        *_SHORT_FORMS,
+        *panel.PANEL_WORDS,
+        *control_panel.KEY_WORDS,
+        "fault",
+        "heal",
+        "where",
+        "urls",
+        "help",
+        "quit",
+    )
 
 
 class Hands:
@@ -86,20 +99,25 @@ class Hands:
                 return "\n".join(map(_where, far_ends))
             case ["urls"]:
                 return "\n".join(_url(each) for each in far_ends)
-            case ["heal"]:
-                for each in far_ends:
-                    _heal(each)
-            case ["fault", code]:
-                _begin(far_ends, kind_named(f"E{code.upper().removeprefix('E')}"), [])
             case _:
-                _befall(far_ends, words)
-        return ""
+                return _befall(far_ends, words)
 
 
-def _befall(far_ends: Sequence[FarEnd], words: Sequence[str]) -> None:
-    """Press a key of the panel, or let a fault happen."""
-    if not panel.at_panel([each.device for each in far_ends], words):
+def _befall(far_ends: Sequence[FarEnd], words: Sequence[str]) -> str:
+    """Press a key of the panel, let a fault happen, or end it; returns what there is to say about it."""
+    match words:
+        case ["heal"]:
+            for each in far_ends:
+                _heal(each)
+            return ""
+        case ["fault", code]:
+            _begin(far_ends, kind_named(f"E{code.upper().removeprefix('E')}"), [])
+            return ""
+    devices = [each.device for each in far_ends]
+    said = control_panel.at_control(devices, words)
+    if said is None and not panel.at_panel(devices, words):
         _begin(far_ends, _kind(words[0]), words[1:])
+    return said or ""
 
 
 def _kind(word: str) -> FaultKind:
@@ -162,6 +180,8 @@ def _where(far_end: FarEnd) -> str:
     device = far_end.device
     if isinstance(device, SimulatedCutter):
         return panel.how_it_stands(device)
+    if isinstance(device, SimulatedControl):
+        return control_panel.how_it_stands(device)
     if isinstance(device, SimulatedDrive):
         moving = "moving" if device.moving else "standing"
         homed = "homed" if device.homed else "not homed"

@@ -10,6 +10,7 @@ from rich.text import Text
 
 from compax_aio.escaping import escaped
 from compax_aio.simulator.camm1 import LogEntry as CutterLogEntry
+from compax_aio.simulator.haas import LogEntry as ControlLogEntry
 
 from ..printing import Printing
 from .devices import Device, Entry
@@ -21,6 +22,7 @@ _TO_HOST: Final = ("←", "cyan")
 _MOTION: Final = ("◆", "green")
 _TROUBLE: Final = ("✗", "red")
 _LIFE: Final = ("·", "dim")
+_BY_HAND: Final = ("☞", "bold")
 _LOOKS: Final[Mapping[str, tuple[str, str]]] = {
     "line": _FROM_HOST,
     "command": _FROM_HOST,
@@ -47,13 +49,28 @@ _LOOKS: Final[Mapping[str, tuple[str, str]]] = {
     "data_error": _TROUBLE,
     "refused": _TROUBLE,
     "befell": _TROUBLE,
+    "key": _BY_HAND,
+    "screen": _MOTION,
+    "alarm": _TROUBLE,
+    "code": _TO_HOST,
+    "flow": _TO_HOST,
+    "block": _MOTION,
+    "stored": _MOTION,
+    "executed": _MOTION,
+    "request": _FROM_HOST,
+    "written": _MOTION,
+    "printed": _TO_HOST,
+    "frozen": _TROUBLE,
 }
 _WORDLESS: Final = frozenset(
     {"line", "command", "answer", "message", "trouble", "befell", "left_out", "control", "instruction"}
+    | {"request", "code", "flow"}
 )
 """Their text alone says it all."""
 _MANY: Final = frozenset({"control", "answer", "enquiry", "handshake", "instruction"})
 """Of a cutter: it may do hundreds in a second, and people read a few."""
+_MANY_OF_CONTROL: Final = frozenset({"block", "executed", "flow", "lost"})
+"""Of a Haas control, in the middle of a file."""
 _PAUSE_S: Final = 0.25
 _CHARACTERS: Final = "received"
 """Of a line of axes: single characters, which the commands show better."""
@@ -109,8 +126,10 @@ class SimView:
             self._show(_Seen(self._time_s(entry.at), name, kind, entry.text, axis, position))
 
     def _is_one_of_many(self, name: str, entry: Entry) -> bool:
-        """Whether to leave out what a cutter does, for people, because something was just shown; they are told."""
-        if self._printing.json or not isinstance(entry, CutterLogEntry) or entry.kind.value not in _MANY:
+        """Whether to leave out what a machine does, for people, because something was just shown; they are told."""
+        many = _MANY if isinstance(entry, CutterLogEntry) else _MANY_OF_CONTROL
+        is_able = isinstance(entry, CutterLogEntry | ControlLogEntry)
+        if self._printing.json or not is_able or entry.kind.value not in many:
             return False
         if entry.at < self._next_at.get(name, float("-inf")):
             self._left_out[name] = self._left_out.get(name, 0) + 1
