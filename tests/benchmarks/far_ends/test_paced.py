@@ -93,6 +93,15 @@ def test_lines_that_come_together_are_heard_and_answered_one_after_the_other(lin
     assert time.monotonic() - asked_at >= ANSWER_TIME_S + wire_s + len(POSITION) * BYTE_TIME_S
 
 
+def test_what_comes_while_the_wire_is_still_busy_is_heard_after_it(line: Line, far: FarEnd) -> None:
+    sent_at = time.monotonic()
+    line.send(b"A" * 28)
+    far.ask("usage")  # it has read that
+    line.send(b"\r")
+    assert line.read() == PROMPT
+    assert time.monotonic() - sent_at >= 29 * BYTE_TIME_S + ANSWER_TIME_S + len(PROMPT) * BYTE_TIME_S
+
+
 def test_half_a_line_is_answered_when_the_rest_has_come(line: Line) -> None:
     line.send(b"S")
     line.send(b"1\r")
