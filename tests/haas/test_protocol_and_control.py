@@ -75,7 +75,7 @@ class Pair:
 
 
 @asynccontextmanager
-async def pair(profile: Profile, baudrate: int = 9600, **knobs: Any) -> AsyncIterator[Pair]:
+async def pair(profile: Profile, baudrate: Any = 9600, **knobs: Any) -> AsyncIterator[Pair]:
     name = f"protocol and control {next(_numbers)}"
     sets = {"xmodem": "xmodem"}.get(str(profile.synchronization), "classic")
     far = control_named(
@@ -260,7 +260,7 @@ async def test_a_control_that_collects_no_data_takes_files_all_the_same() -> Non
 
 @pytest.mark.parametrize("seed", range(8))
 async def test_answers_that_are_late_lost_or_doubled_are_never_anothers(seed: int) -> None:
-    chances = {"late_reply": 0.2, "lose_reply": 0.1, "double_reply": 0.1}
+    chances: dict[str, Any] = {"late_reply": 0.2, "lose_reply": 0.1, "double_reply": 0.1}
     answered = 0
     async with pair(CLASSIC, seed=seed, late_s=3.0, **chances) as ends:
         for number in (1, 5, 9, 13, 17, 21, 25, 29) * 3:

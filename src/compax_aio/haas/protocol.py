@@ -18,31 +18,26 @@ from collections.abc import Callable
 from typing import Final
 
 from ..errors import InvalidCommandError, LinkProtocolError
-from ..link.contract import Event, GoesOn, Hold, InStep, LateEnding, MarkerSpent, Stranger
+from ..link.contract import Event, GoesOn, Hold, InStep, MarkerSpent, Stranger
 from ..link.level import LineLevel
-from .answers import Belongs, Request, belonging
-from .facts.characters import DC1, DC3, ETB, PROMPT, STX
+from .facts.characters import ETB, PROMPT, STX
 from .frames import Broken, Echo, Frame, FrameSplitter, Line, Outside, Part, PrintReader
 from .line_code import LineCode
-from .owed import OwedAnswers
 from .profiles import Profile
 from .protocol_events import (
     Answered,
     CutShort,
     HeldBack,
     LeftOver,
-    NobodyAnswers,
-    Overheard,
     Printed,
-    ReaderOff,
-    ReaderOn,
     TransferOver,
     Unreadable,
 )
 from .protocol_states import BUSY, DOUBTFUL, TRANSITIONS, State, Step
+from .questions import Questions
 from .settings import ControlSettings
+from .signs import FlowSigns
 from .transfers.account import Ending, Phase
-from .transfers.choosing import HELD_BY_SIGNS
 from .transfers.strategy import Strategy
 
 __all__ = ["HaasProtocol"]
@@ -51,9 +46,6 @@ _MOST_WHILE_QUIETING_BYTES: Final = 4096
 """So much comes in four seconds at 9600 baud: whatever it is, it does not end soon."""
 _MOST_PUT_OFFS: Final = 256
 """And so often such a pause begins anew."""
-_SIGNS: Final = bytes((DC1, DC3))
-_SHOWN_BYTES: Final = 64
-_WITH_READER: Final = "dc codes"
 
 
 class HaasProtocol:
@@ -76,18 +68,11 @@ class HaasProtocol:
         self._code = LineCode(profile)
         self._splitter = FrameSplitter(profile.data_collection or "rs-232")
         self._prints = PrintReader()
-        self._owed = OwedAnswers()
+        self._questions = Questions()
         self._loaded: Strategy | None = None
         self._strategy: Strategy | None = None
         """Of the transfer that is the turn."""
-        self._request: Request | None = None
-        """What is to be asked, or is."""
-        self._probe: Request | None = None
-        """What is asked first, because something is owed."""
-        self._is_held = False
-        """Whether the control has told to send nothing (Xoff)."""
-        self._is_reader_on = False
-        """Whether it has told that it reads (DC1, with DC codes), and nothing was sent since."""
+        self._signs = FlowSigns(profile)
         self._came_bytes = self._put_offs = 0
         """In the pause, so far."""
         self._babbles = False
@@ -118,13 +103,13 @@ class HaasProtocol:
         if self.state is State.QUIETING:
             return settings.quiet_s
         if self.state is State.CALMING:
-            return settings.silence_timeout_s if self._is_held else self._calm_s
+            return settings.silence_timeout_s if self._signs.is_held else self._calm_s
         return settings.answer_timeout_s + self.level.leaves_s(self._unwritten_bytes)
 
     @property
     def _calm_s(self) -> float:
         """How long the line is silent before something is sent."""
-        is_file_in_doubt = self._strategy is not None and self._owed
+        is_file_in_doubt = self._strategy is not None and self._questions.owes
         return self._settings.quiet_s if is_file_in_doubt else self._settings.gap_s
 
     @property
@@ -157,11 +142,12 @@ class HaasProtocol:
         self._begin_anew()
 
     def _begin_anew(self) -> None:
-        self._strategy = self._request = self._probe = None
-        self._owed.clear()
+        self._strategy = None
+        self._questions.line_is_new()
         self._splitter.give_up()
         self._prints.give_up()
-        self._is_held = self._is_reader_on = self._babbles = self._is_file_left = False
+        self._signs.forget()
+        self._babbles = self._is_file_left = False
         self._to_send.clear()
 
     def load(self, strategy: Strategy) -> None:
@@ -182,7 +168,7 @@ class HaasProtocol:
             else:
                 self._begin_transfer()
         else:
-            self._request = Request.sent_as(text)
+            self._questions.begin(text)
             self._begin_pause(Step.SEND_BEGUN)
 
     def send_marker(self) -> None:
@@ -200,13 +186,9 @@ class HaasProtocol:
             self._is_file_left |= self.state is State.TRANSFERRING and not self._strategy.sends
             self._events.append(TransferOver(self._strategy.account()))
             self._strategy = None
-        elif self._request is not None:
-            if self.state is State.ASKING:
-                self._owed.add(self._request)
-            elif self.state is State.CATCHING_UP:
-                self._owed.add(self._probed)
-            self._events.append(CutShort(self._request.text))
-        self._request = self._probe = None
+        elif (asked := self._questions.asked) is not None:
+            self._questions.give_up()
+            self._events.append(CutShort(asked))
         self._begin_pause(Step.PREEMPTED)
 
     def time_ran_out(self) -> None:
@@ -218,13 +200,10 @@ class HaasProtocol:
             self._get_in_step()
         elif self.state is State.CALMING:
             self._end_calm()
-        elif self.state is State.CATCHING_UP:
-            self._owed.add(self._probed)
-            self._events.append(NobodyAnswers(self._asked.text, self._probed.text))
-            self._end_request(Step.TIME_RAN_OUT)
         else:
-            self._owed.add(self._asked)
-            self._end_request(Step.TIME_RAN_OUT)
+            if (nobody_answers := self._questions.give_up()) is not None:
+                self._events.append(nobody_answers)
+            self._step(Step.TIME_RAN_OUT)
 
     def resume(self) -> None:
         """Do nothing: the line is never held."""
@@ -251,12 +230,13 @@ class HaasProtocol:
         if self.state is State.TRANSFERRING:
             self._read_in_transfer(data, is_damaged)
             return
-        if self._profile.synchronization in HELD_BY_SIGNS or self._profile.synchronization == _WITH_READER:
-            without_signs = data.translate(None, _SIGNS)
-            if len(without_signs) != len(data):
-                self._heed_signs(data)
-                is_damaged &= data[0] not in _SIGNS
-                data = without_signs
+        was_held = self._signs.is_held
+        rest, told = self._signs.take(data)
+        self._events += told
+        if self.state is State.CALMING and self._signs.is_held is not was_held:
+            self._events.append(GoesOn())
+        is_damaged &= rest[:1] == data[:1]  # a sign that came damaged was none
+        data = rest
         self._read_answers(data, is_damaged)
         self._put_off_pause(len(data))
 
@@ -266,7 +246,7 @@ class HaasProtocol:
         self._came_bytes += came_bytes
         self._put_offs += 1
         if self._came_bytes <= _MOST_WHILE_QUIETING_BYTES and self._put_offs <= _MOST_PUT_OFFS:
-            if not (self.state is State.CALMING and self._is_held):
+            if not (self.state is State.CALMING and self._signs.is_held):
                 self._events.append(GoesOn())
         elif self.state is State.QUIETING:
             self._babbles = True
@@ -275,20 +255,6 @@ class HaasProtocol:
         else:
             self._hold_back(by_xoff=False)
 
-    def _heed_signs(self, data: bytes) -> None:
-        """Heed DC1 and DC3, which may stand anywhere in what comes."""
-        for sign in data:
-            if sign not in _SIGNS:
-                continue
-            is_go = sign == DC1
-            if self._profile.synchronization == _WITH_READER:
-                self._is_reader_on = is_go
-                self._events.append(ReaderOn() if is_go else ReaderOff())
-            elif self._is_held is is_go:
-                self._is_held = not is_go
-                if self.state is State.CALMING:
-                    self._events.append(GoesOn())
-
     def _read_answers(self, data: bytes, is_damaged: bool) -> None:
         if is_damaged:
             self._splitter.note_damage()
@@ -296,7 +262,7 @@ class HaasProtocol:
             if isinstance(part, Frame):
                 self._read_frame(part.text)
             elif isinstance(part, Broken):
-                self._read_broken(part.data)
+                self._note_answer(self._questions.read_broken(part.data.decode("latin-1")))
             elif isinstance(part, Outside):
                 self._read_outside(part.data, part.is_damaged)
 
@@ -313,53 +279,18 @@ class HaasProtocol:
 
     def _read_frame(self, text: str) -> None:
         self._print(self._prints.answer_begins())
-        if self.state is State.CATCHING_UP and belonging(self._probed, text) is Belongs.YES:
-            self._owed.clear()
-            self._probe = None
+        if (event := self._questions.read(text)) is not None:
+            self._note_answer(event)
+        else:
             self._begin_pause(Step.CAUGHT_UP)
             self._events.append(GoesOn())
-        elif self.state is State.ASKING and belonging(self._asked, text) is Belongs.YES:
-            self._answered(text)
-        elif (late := self._owed.take(text)) is not None:
-            self._events.append(LateEnding(late.text, Answered(text)))
-        elif self.state is State.ASKING and belonging(self._asked, text) is Belongs.PERHAPS:
-            self._answered(text)
-        elif self.state is State.ASKING and belonging(self._asked, text) is Belongs.UNKNOWN:
-            self._fail(text)
-        else:
-            self._events.append(Overheard(text))
 
-    def _answered(self, text: str) -> None:
-        self._owed.clear()  # a control answers in order
-        self._events.append(Answered(text))
-        self._end_request(Step.ANSWERED)
-
-    def _read_broken(self, data: bytes) -> None:
-        text = data[:_SHOWN_BYTES].decode("latin-1")
-        if self.state is State.ASKING:
-            self._fail(text)
-        else:
-            self._events.append(Overheard(text))
-
-    def _fail(self, text: str) -> None:
-        """Take note of an answer that cannot be read; another one may still come."""
-        self._owed.add(self._asked)
-        self._events.append(Unreadable(self._asked.text, text[:_SHOWN_BYTES]))
-        self._end_request(Step.UNREADABLE)
-
-    def _end_request(self, step: Step) -> None:
-        self._step(step)
-        self._request = self._probe = None
-
-    @property
-    def _asked(self) -> Request:
-        assert self._request is not None  # there is one in every state in which something is asked
-        return self._request
-
-    @property
-    def _probed(self) -> Request:
-        assert self._probe is not None  # the same
-        return self._probe
+    def _note_answer(self, event: Event) -> None:
+        self._events.append(event)
+        if isinstance(event, Answered):
+            self._step(Step.ANSWERED)
+        elif isinstance(event, Unreadable):
+            self._step(Step.UNREADABLE)
 
     # Pauses ---------------------------------------------------------------------------------------------------------
 
@@ -367,7 +298,7 @@ class HaasProtocol:
         """Expect no more of an answer of which only the beginning has come."""
         for part in self._splitter.give_up():
             if isinstance(part, Broken):
-                self._read_broken(part.data)
+                self._note_answer(self._questions.read_broken(part.data.decode("latin-1")))
 
     def _get_in_step(self) -> None:
         self._forget_begun()
@@ -382,29 +313,28 @@ class HaasProtocol:
 
     def _end_calm(self) -> None:
         self._forget_begun()
-        if self._is_held:
+        if self._signs.is_held:
             self._hold_back(by_xoff=True)
         elif self._strategy is not None:
             self._begin_transfer()
-        elif self._owed.hides(self._asked):
-            self._probe = self._owed.probe()
-            self._step(Step.PROBE_SENT)
-            self._ask(self._probe)
         else:
-            self._step(Step.QUERY_SENT)
-            self._ask(self._asked)
+            self._ask()
 
-    def _ask(self, request: Request) -> None:
-        self._prints.expect_echo(self._profile.request_prefix + request.text)
-        self._write((self._profile.request_prefix + request.text + self._profile.request_end).encode("ascii"))
+    def _ask(self) -> None:
+        text = self._profile.request_prefix + self._questions.next_text()
+        self._step(Step.PROBE_SENT if self._questions.is_probing else Step.QUERY_SENT)
+        self._prints.expect_echo(text)
+        self._write((text + self._profile.request_end).encode("ascii"))
 
     def _hold_back(self, *, by_xoff: bool) -> None:
         """Send nothing of what was to be sent; the next one is sent all the same, for an Xon may be lost."""
-        sent = self._strategy.label if self._strategy is not None else self._asked.text
+        sent = self._strategy.label if self._strategy is not None else self._questions.asked
+        assert sent is not None  # it is one of them
         self._strategy = None
-        self._is_held = False
+        self._questions.drop()
+        self._signs.is_held = False
+        self._step(Step.HELD_BACK)
         self._events.append(HeldBack(sent, by_xoff))
-        self._end_request(Step.HELD_BACK)
 
     # Transfers ------------------------------------------------------------------------------------------------------
 
@@ -414,7 +344,7 @@ class HaasProtocol:
         return self._strategy
 
     def _begin_transfer(self) -> None:
-        is_reader_on, self._is_reader_on = self._is_reader_on, False
+        is_reader_on, self._signs.is_reader_on = self._signs.is_reader_on, False
         self._step(Step.TRANSFER_BEGUN)
         level = LineLevel(self.level.bytes_per_s, lambda: self.level.unsent() + self._unwritten_bytes)
         self._transfer.begin(level, self._write, reader_is_on=is_reader_on)
@@ -437,7 +367,7 @@ class HaasProtocol:
 
     def _may_answer(self, strategy: Strategy) -> bool:
         """Whether what comes next may belong to an answer, although a file is on its way."""
-        return not strategy.takes_all and (strategy.sends or bool(self._owed) or self._splitter.awaits_prompt)
+        return not strategy.takes_all and (strategy.sends or self._questions.owes or self._splitter.awaits_prompt)
 
     def _read_part_in_transfer(self, strategy: Strategy, part: Part) -> None:
         if isinstance(part, Frame):

@@ -1,157 +1,108 @@
-"""What can be asked of a control, as its methods: a question each, a typed answer or an error with its story."""
+"""The question of a line, and those before it that are unanswered: what an answer that comes is to."""
 
 from __future__ import annotations
 
-from datetime import timedelta
-from typing import cast
+from typing import Final
 
-from ..errors import InvalidCommandError
-from .answers import Answer, ProgramStatus, Request
-from .collecting import Collecting, value_of
-from .facts.queries import QUERIES
-from .variables import VariableWriter
-from .watching import Quantity, Watch, Watching
+from ..link.contract import Event, LateEnding
+from .answers import Belongs, Request, belonging
+from .owed import OwedAnswers
+from .protocol_events import Answered, NobodyAnswers, Overheard, Unreadable
 
 __all__ = ["Questions"]
 
+_SHOWN: Final = 64
+
 
 class Questions:
-    """
-    Data collection of a control (Setting 143), for :class:`Control`.
+    """Knows what is asked, what is asked first because of what is owed, and whose answer comes."""
 
-    Any number of callers may ask at once: questions go one after the other, with a pause between them, ever more
-    rarely while the control is silent, and not while a transfer is under way or a program prints.
+    def __init__(self) -> None:
+        self._owed = OwedAnswers()
+        self._request: Request | None = None
+        """What is to be asked, or is."""
+        self._probe: Request | None = None
+        """What is asked first, because something is owed."""
+        self._is_sent = False
+        """Whether an answer is awaited: to the probe, if there is one."""
 
-    All of these raise InvalidCommandError if the profile says that the control collects no data; AnswerTimeoutError if
-    it does not answer, or cannot be asked now; CommandRejectedError if it does not know the question, or is busy and
-    says no more; UnexpectedAnswerError if what came is no answer; ConnectionLostError without a line.
-    """
+    @property
+    def asked(self) -> str | None:
+        """The question whose turn it is, sent or not; None: there is none."""
+        return None if self._request is None else self._request.text
 
-    _collecting: Collecting
-    _watching: Watching
-    _writer: VariableWriter
+    @property
+    def owes(self) -> bool:
+        """Whether an answer may still come to a question that was given up."""
+        return bool(self._owed)
 
-    async def query(self, question: str | int) -> Answer:
+    @property
+    def is_probing(self) -> bool:
+        """Whether something else is asked first."""
+        return self._probe is not None
+
+    def begin(self, text: str) -> None:
         """
-        Ask by the question's name, and return the answer with all its fields: ``await control.query("Q104")``.
-
-        Args:
-            question: ``"Q100"``, ``"Q600 3027"``, or the number of a known one: 100. One that is not known here is
-                sent all the same, and answered by a plain :class:`Answer`.
-        """
-        if isinstance(question, int) and f"Q{question}" not in QUERIES:
-            raise InvalidCommandError(
-                f"there is no question Q{question} that is known", hint="variable() reads a variable by its number"
-            )
-        return await self._collecting.ask(Request.of(question))
-
-    async def variable(self, number: int) -> float | None:
-        """
-        Read a macro or system variable (Q600): ``await control.variable(3027)`` is the spindle's speed.
-
-        Returns:
-            Its value; None: it is empty, #0.
-        """
-        return cast("float | None", value_of(await self._collecting.ask(Request.of_variable(number))))
-
-    async def serial_number(self) -> str:
-        """Read the serial number (Q100)."""
-        return await self._text("Q100")
-
-    async def software_version(self) -> str:
-        """Read the version of the control's software (Q101)."""
-        return await self._text("Q101")
-
-    async def model(self) -> str:
-        """Read the model (Q102)."""
-        return await self._text("Q102")
-
-    async def mode(self) -> str:
-        """Read the mode (Q104), ``MDI``, ``ZERO RET``, without the parentheses of classic controls."""
-        return await self._text("Q104")
-
-    async def tool_changes(self) -> int:
-        """Read how often the tool was changed (Q200)."""
-        return await self._count("Q200")
-
-    async def tool_in_use(self) -> int:
-        """Read which tool is in use (Q201)."""
-        return await self._count("Q201")
-
-    async def power_on_time(self) -> timedelta:
-        """Read for how long the control has been on (Q300)."""
-        return await self._time("Q300")
-
-    async def motion_time(self) -> timedelta:
-        """Read for how long its axes have moved (Q301)."""
-        return await self._time("Q301")
-
-    async def last_cycle(self) -> timedelta:
-        """Read how long the last cycle took (Q303)."""
-        return await self._time("Q303")
-
-    async def previous_cycle(self) -> timedelta:
-        """Read how long the cycle before took (Q304)."""
-        return await self._time("Q304")
-
-    async def m30_count(self, counter: int = 1) -> int:
-        """Read an M30 counter (Q402, Q403), 1 or 2: how many programs have ended."""
-        if counter not in (1, 2):
-            raise InvalidCommandError(f"the M30 counters are 1 and 2, not {counter!r}")
-        return await self._count(f"Q40{counter + 1}")
-
-    async def program_status(self) -> ProgramStatus:
-        """
-        Read program, status and parts (Q500).
-
-        A control that runs a cycle says that it is busy, and nothing else: that is a state, ``is_busy``, and no error.
-        """
-        return cast("ProgramStatus", value_of(await self._collecting.ask(Request.of("Q500"))))
-
-    def watch(self, *quantities: Quantity, interval_s: float | None = None, only_changes: bool = False) -> Watch:
-        """
-        Follow questions and variables: ``async for reading in control.watch("Q500", 3027)``.
-
-        However many watch, each question is asked once a cycle. While a transfer is under way there are no readings.
-
-        Args:
-            quantities: ``"Q500"``; or the number of a variable.
-            interval_s: From one reading to the next; at least the settings' ``cycle_s``, which is the default.
-            only_changes: Leave out readings that say the same as the one before.
+        Take the next question.
 
         Raises:
-            InvalidCommandError: One of them cannot be watched, or not that often.
+            InvalidCommandError: It is none.
         """
-        return self._watching.watch(quantities, interval_s, only_changes=only_changes)
+        self._request = Request.sent_as(text)
 
-    async def write_variable(self, number: int, value: float) -> float:
-        """
-        Write a variable (E), and read it back; off by default.
+    def next_text(self) -> str:
+        """Return what is to be sent now: the question, or another one whose answer shows that nothing is owed."""
+        assert self._request is not None  # it has begun
+        self._probe = self._owed.probe() if self._owed.hides(self._request) else None
+        self._is_sent = True
+        return (self._probe or self._request).text
 
-        It is sent once at most, whatever happens; if it was sent it is carried through and goes on record, in the log
-        ``compax_aio.haas.writes``, although the caller is cancelled.
+    def read(self, text: str) -> Event | None:
+        """Say what an answer is; None: it was the one to what was asked first, and the question itself may be sent."""
+        asked = (self._probe or self._request) if self._is_sent else None
+        belongs = Belongs.NO if asked is None else belonging(asked, text)
+        if belongs is Belongs.YES:
+            return self._answered(text)
+        if (late := self._owed.take(text)) is not None:
+            return LateEnding(late.text, Answered(text))
+        if self._probe is None and belongs is Belongs.PERHAPS:
+            return self._answered(text)
+        if self._probe is None and belongs is Belongs.UNKNOWN:
+            return self.read_broken(text)
+        return Overheard(text)
 
-        Args:
-            number: Among ``writable`` of :class:`ControlSettings`, and not protected: values of probes never are.
-            value: Within ±``largest_value``, with no more decimals than the control shows, 4, or 6 over Ethernet.
+    def _answered(self, text: str) -> Event | None:
+        self._owed.clear()  # a control answers in order
+        if self._probe is not None:
+            self._probe, self._is_sent = None, False
+            return None
+        self.drop()
+        return Answered(text)
 
-        Returns:
-            What it reads afterwards.
+    def read_broken(self, text: str) -> Event:
+        """Say what something is that began like an answer: the question has failed by it, if one is asked."""
+        if not self._is_sent or self._probe is not None or self._request is None:
+            return Overheard(text[:_SHOWN])
+        sent = self._request.text
+        self.give_up()
+        return Unreadable(sent, text[:_SHOWN])
 
-        Raises:
-            InvalidCommandError: It may not be written; nothing was sent.
-            CommandRejectedError: The control does not take it; it reads as before.
-            UnexpectedAnswerError: It reads something else afterwards.
-            AnswerTimeoutError, ConnectionLostError: Nothing was written if it could not be read before; else whether it
-                was written is in doubt, and the error says so.
-        """
-        return await self._writer.write(number, value)
+    def give_up(self) -> NobodyAnswers | None:
+        """Await no answer any more, though it may come; say what was not sent, if something else was asked first."""
+        told = None
+        if self._is_sent and self._request is not None:
+            self._owed.add(self._probe or self._request)
+            if self._probe is not None:
+                told = NobodyAnswers(self._request.text, self._probe.text)
+        self.drop()
+        return told
 
-    async def _text(self, command: str) -> str:
-        return cast("str", value_of(await self._collecting.ask(Request.of(command))))
+    def drop(self) -> None:
+        """Have no question any more."""
+        self._request = self._probe = None
+        self._is_sent = False
 
-    async def _count(self, command: str) -> int:
-        return cast("int", value_of(await self._collecting.ask(Request.of(command))))
-
-    async def _time(self, command: str) -> timedelta:
-        return cast("timedelta", value_of(await self._collecting.ask(Request.of(command))))
+    def line_is_new(self) -> None:
+        """Take note that nothing will be answered that was asked until now."""
+        self._owed.clear()
+        self.drop()

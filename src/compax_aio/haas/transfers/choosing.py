@@ -13,16 +13,13 @@ from .receiving import ReceiveFile
 from .sending import SendByDcCodes, SendByWires, SendFile
 from .strategy import Patience, Strategy
 
-__all__ = ["HELD_BY_SIGNS", "drip_feed", "receive_file", "send_file"]
+__all__ = ["drip_feed", "receive_file", "send_file"]
 
 XMODEM: Final = "xmodem"
 
 _SENDERS: Final[Mapping[str, type[SendFile]]] = MappingProxyType(
     {"rts/cts": SendByWires, "xon/xoff": SendFile, "dc codes": SendByDcCodes}
 )
-
-HELD_BY_SIGNS: Final = frozenset({"xon/xoff"})
-"""With these DC3 means stop, and DC1 go on, at any time; with DC codes only while a file is sent."""
 
 
 def receive_file(
