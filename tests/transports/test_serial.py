@@ -418,6 +418,13 @@ async def test_a_port_opens_with_9600_baud_8n1_without_handshake() -> None:
     assert port.exclusive
 
 
+async def test_a_pty_that_keeps_no_frame_is_opened_again_with_the_same_one() -> None:
+    async with pty("&baudrate=4800&bytesize=7&parity=E&stopbits=2") as (url, _):
+        await opens(url)
+        port = await opens(url)  # nothing but what it does not keep would change, and libc calls that invalid
+        assert (port.baudrate, port.stopbits) == (4800, 2)
+
+
 async def test_every_option_reaches_the_port() -> None:
     async with pty("&baudrate=4800&bytesize=7&parity=E&stopbits=2&rtscts=1&xonxoff=1&dsrdtr=1") as (url, _):
         port = await opens(url)

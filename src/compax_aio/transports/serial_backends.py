@@ -8,6 +8,7 @@ import importlib.util
 import os
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from dataclasses import replace
 from types import MappingProxyType, ModuleType
 from typing import Any, Final, Protocol
 
@@ -70,7 +71,17 @@ def _serialx() -> ModuleType:
 
 def open_port(backend: str, name: str, settings: LineSettings, *, dsrdtr: bool) -> Port:
     """Open *name* exclusively; for use in a thread. What the library raises, it raises."""
-    return BACKENDS[backend](name, settings, dsrdtr)
+    try:
+        return BACKENDS[backend](name, settings, dsrdtr)
+    except Exception:
+        if (settings.bytesize, settings.parity) == (8, "N") or not _is_pseudo_terminal(name):
+            raise
+    # It has no frame: the kernel keeps neither size nor parity, and libc refuses a change of nothing but these.
+    return BACKENDS[backend](name, replace(settings, bytesize=8, parity="N"), dsrdtr)
+
+
+def _is_pseudo_terminal(name: str) -> bool:
+    return os.path.realpath(name).startswith("/dev/pts/")
 
 
 def _open_with_pyserial(name: str, settings: LineSettings, dsrdtr: bool) -> Port:
