@@ -68,7 +68,7 @@ async def begun(*work: Coroutine[Any, Any, Any]) -> list[asyncio.Task[Any]]:
 
 def hang_up(drive: Drive) -> None:
     """Let the line go away."""
-    transport = drive._line.link._port._transport
+    transport = drive._line.link._port.transport
     assert transport is not None
     transport.abort()
 

@@ -65,7 +65,7 @@ async def test_the_driver_of_a_serial_port_tells_what_waits_with_it(
     driver: Any, unsent: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     line = await connected()
-    monkeypatch.setattr(line.link._port._transport, "get_extra_info", lambda name: driver if name == "serial" else None)
+    monkeypatch.setattr(line.link._port.transport, "get_extra_info", lambda name: driver if name == "serial" else None)
     assert line.link.unsent_bytes == unsent
 
 
@@ -76,7 +76,7 @@ async def test_a_port_that_went_away_has_nothing_unsent(monkeypatch: pytest.Monk
             raise OSError("it was unplugged")
 
     line = await connected()
-    monkeypatch.setattr(line.link._port._transport, "get_extra_info", lambda _: Gone())
+    monkeypatch.setattr(line.link._port.transport, "get_extra_info", lambda _: Gone())
     assert line.link.unsent_bytes == 0
     await line.link.close()
     assert line.link.unsent_bytes == 0

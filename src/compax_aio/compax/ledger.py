@@ -52,9 +52,11 @@ def _key(text: str) -> tuple[str, str] | None:
 class Ledger:
     """Unanswered lines; the oldest is forgotten when there are very many, and looking for one takes no longer then."""
 
-    __slots__ = ("_asked", "_commands", "_lines", "_next_marker", "_owed")
+    __slots__ = ("_asked", "_commands", "_lines", "_next_marker", "_owed", "last")
 
     def __init__(self) -> None:
+        self.last: Sent | None = None
+        """What was sent last, if it is unanswered."""
         self._next_marker = 0
         self._lines: list[Sent] = []
         self._commands: list[Sent] = []
@@ -66,11 +68,6 @@ class Ledger:
 
     def __len__(self) -> int:
         return len(self._lines)
-
-    @property
-    def last(self) -> Sent | None:
-        """What was sent last, if it is unanswered."""
-        return self._lines[-1] if self._lines else None
 
     @property
     def only_command(self) -> Sent | None:
@@ -93,6 +90,7 @@ class Ledger:
 
     def settle(self) -> None:
         """Forget all: it is answered, refused or lost."""
+        self.last = None
         self._lines.clear()
         self._commands.clear()
         self._owed.clear()
@@ -111,6 +109,7 @@ class Ledger:
             self._add(sent)
 
     def _add(self, sent: Sent) -> None:
+        self.last = sent
         self._lines.append(sent)
         if sent.key is not None:
             self._asked[sent.key] = self._asked.get(sent.key, 0) + 1
@@ -121,6 +120,8 @@ class Ledger:
 
     def _forget_oldest(self) -> Sent:
         sent = self._lines.pop(0)
+        if not self._lines:
+            self.last = None
         if sent.key is not None:
             self._asked[sent.key] -= 1
             return sent

@@ -88,6 +88,10 @@ class CompaxProtocol:
         error_pattern: str = ERROR_PATTERN,
     ) -> None:
         self.state = State.IN_DOUBT
+        self.is_busy = False
+        """Whether a line is outstanding."""
+        self.in_doubt = True
+        """Whether it is unknown what the drive will answer next."""
         self.message_form = message_form
         self.encode = encode
         self._error = re.compile(error_pattern)
@@ -103,16 +107,6 @@ class CompaxProtocol:
         self._flood = ""
 
     # What the link asks ---------------------------------------------------------------------------------------------
-
-    @property
-    def in_doubt(self) -> bool:
-        """Whether it is unknown what the drive will answer next."""
-        return self.state in DOUBTFUL
-
-    @property
-    def is_busy(self) -> bool:
-        """Whether a line is outstanding."""
-        return self.state in BUSY
 
     @property
     def patience_s(self) -> float | None:
@@ -230,13 +224,15 @@ class CompaxProtocol:
 
     def _step(self, what: type[Event]) -> None:
         try:
-            self.state = TRANSITIONS[self.state, what]
+            self.state = state = TRANSITIONS[self.state, what]
         except KeyError:
             raise LinkProtocolError(
                 f"{what.__name__} is not possible while {self.state.value}",
                 sent=self._ledger.last.text if self._ledger.last else None,
                 hint="wait for the turn to be over",
             ) from None
+        # What the state means to the link, which asks it far more often than it changes.
+        self.is_busy, self.in_doubt = state in BUSY, state in DOUBTFUL
 
     def _notice(self, event: Event) -> None:
         self._step(type(event))

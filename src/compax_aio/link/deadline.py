@@ -31,7 +31,11 @@ class Deadline:
 
     def put_off(self, by_s: float) -> None:
         """Count *by_s* from now."""
-        self._at = self._loop.time() + by_s
+        self.put_off_to(self._loop.time() + by_s)
+
+    def put_off_to(self, at: float) -> None:
+        """Call nobody before *at*, a time of the loop."""
+        self._at = at
         if self._timer is not None and self._timer.when() > self._at:
             self.cancel()
         if self._timer is None:

@@ -133,7 +133,7 @@ class Link(asyncio.Protocol):
         await self._attempts.make(self._url, self._check_there)
 
     def _check_there(self) -> None:
-        if not self._port.is_there:
+        if self._port.transport is None:
             raise self._lost(None)
 
     async def close(self) -> None:
@@ -153,7 +153,7 @@ class Link(asyncio.Protocol):
     @property
     def is_open(self) -> bool:
         """Whether there is a line, and who is on it was looked at."""
-        return self._port.is_there and self._turns.queue.is_admitted and not self.is_over
+        return self._port.transport is not None and self._turns.queue.is_admitted and not self.is_over
 
     @property
     def is_over(self) -> bool:
@@ -205,7 +205,7 @@ class Link(asyncio.Protocol):
 
     def check_not_lost(self, since: int) -> None:
         """Raise ConnectionLostError if there is no line, or another one than when it was opened *since* times."""
-        if self.is_over or not self._port.is_there or self._attempts.count != since:
+        if self.is_over or self._port.transport is None or self._attempts.count != since:
             raise self._lost(None)
 
     @property
@@ -271,15 +271,12 @@ class Link(asyncio.Protocol):
             if lane is Lane.STOP:
                 self._turns.say_ahead(exchange)  # it may be heard, although nothing comes back
             self._renew(self._silence.error)
-        if self._takes(exchange):
+        waits_for_line = survives_loss and self._reconnecting is not None
+        if (waits_for_line or self._port.transport is not None) and not self.is_over:
             self._turns.put(exchange)
         else:
             waiter.set_exception(self._lost(exchange))
         return waiter
-
-    def _takes(self, exchange: Exchange) -> bool:
-        waits_for_line = exchange.survives_loss and self._reconnecting is not None
-        return not self.is_over and (waits_for_line or self._port.is_there)
 
     def preempt(self, text: str) -> asyncio.Future[None]:
         """
@@ -291,7 +288,7 @@ class Link(asyncio.Protocol):
         Raises:
             ConnectionLostError: There is no line; nothing was sent.
         """
-        if not self._port.is_there or self.is_over:
+        if self._port.transport is None or self.is_over:
             raise self._lost(None)
         return self._turns.preempt(text)
 
@@ -338,7 +335,7 @@ class Link(asyncio.Protocol):
 
     def data_received(self, data: bytes) -> None:
         """Pass bytes in, events out."""
-        if not self._port.is_there:  # any more
+        if self._port.transport is None:  # any more
             return
         self._port.received(data)
         self._port.in_pieces(data, self._turns.receive)

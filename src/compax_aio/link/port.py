@@ -48,7 +48,8 @@ class Port:
         self._history = history
         self._telling = telling
         self._loop = asyncio.get_running_loop()
-        self._transport: asyncio.Transport | None = None
+        self.transport: asyncio.Transport | None = None
+        """None where there is none, or it was let go of."""
         self._unread = bytearray()
         self._end: asyncio.Future[None] | None = None
         self.heard_at = 0.0
@@ -58,14 +59,9 @@ class Port:
         self._sent_at = 0.0
         """Loop time at which all is on its way that was written, if the line sends as fast as that."""
 
-    @property
-    def is_there(self) -> bool:
-        """Whether there is a transport that was not let go of."""
-        return self._transport is not None
-
     def opened(self, transport: asyncio.Transport) -> None:
         """Take a transport."""
-        self._transport = transport
+        self.transport = transport
         self._unread.clear()
         self.heard_at = self._sent_at = self._loop.time()
         self._end = self._loop.create_future()
@@ -74,12 +70,12 @@ class Port:
 
     def extra_info(self, name: str) -> Any:
         """Return what the transport says of itself under *name*; None if it says nothing, or is not there."""
-        return self._transport.get_extra_info(name) if self._transport is not None else None
+        return self.transport.get_extra_info(name) if self.transport is not None else None
 
     @property
     def is_stuck(self) -> bool:
         """Whether the far end takes nothing, and more has been written than it will ever be well to send."""
-        return self._transport is not None and self._transport.get_write_buffer_size() > _MOST_UNSENT_BYTES
+        return self.transport is not None and self.transport.get_write_buffer_size() > _MOST_UNSENT_BYTES
 
     @property
     def unsent_bytes(self) -> int:
@@ -89,9 +85,9 @@ class Port:
         The transport and the driver of a serial port tell what waits with them; what waits behind them, in an adapter
         or a terminal server, is reckoned from the time it takes at :attr:`bytes_per_s`.
         """
-        if self._transport is None:
+        if self.transport is None:
             return 0
-        waiting = self._transport.get_write_buffer_size() + _unsent_by_driver(self._transport)
+        waiting = self.transport.get_write_buffer_size() + _unsent_by_driver(self.transport)
         if self.bytes_per_s is None:
             return waiting
         reckoned = (self._sent_at - self._loop.time()) * self.bytes_per_s
@@ -99,21 +95,22 @@ class Port:
 
     def ended(self) -> None:
         """Take note that the transport has reported its end."""
-        self._transport = None
+        self.transport = None
         if self._end is not None and not self._end.done():
             self._end.set_result(None)
 
     def write(self, data: bytes, *, goes_on: bool = False) -> None:
         """Hand *data* to the transport, if there is one; *goes_on* with what was written before, or begin a line."""
-        if self._transport is None:
+        if self.transport is None:
             return
         self._stats.bytes_sent += len(data)
-        self._history.sent(self._loop.time(), data, goes_on=goes_on)
+        now = self._loop.time()
+        self._history.sent(now, data, goes_on=goes_on)
         if _wire_log.isEnabledFor(logging.DEBUG):
             _wire_log.debug("%s → %s", self._name, readable(data))
         if self.bytes_per_s is not None:
-            self._sent_at = max(self._sent_at, self._loop.time()) + len(data) / self.bytes_per_s
-        self._transport.write(data)
+            self._sent_at = max(self._sent_at, now) + len(data) / self.bytes_per_s
+        self.transport.write(data)
 
     def received(self, data: bytes) -> None:
         """Take note of bytes that have come."""
@@ -132,12 +129,12 @@ class Port:
             return
         is_at_it = bool(self._unread)
         self._unread += data
-        if not is_at_it and self._transport is not None:
-            self._transport.pause_reading()
-            self._read_piece(self._transport, read)
+        if not is_at_it and self.transport is not None:
+            self.transport.pause_reading()
+            self._read_piece(self.transport, read)
 
     def _read_piece(self, transport: asyncio.Transport, read: Callable[[bytes], None]) -> None:
-        if transport is not self._transport:  # the line was lost meanwhile
+        if transport is not self.transport:  # the line was lost meanwhile
             return
         piece = bytes(self._unread[:_PIECE_BYTES])
         del self._unread[:_PIECE_BYTES]
@@ -146,12 +143,12 @@ class Port:
         if self._telling.is_heard:
             self._telling.tell(Received(piece))
         read(piece)
-        if not self._unread and transport is self._transport:
+        if not self._unread and transport is self.transport:
             transport.resume_reading()
 
     def hang_up(self) -> None:
         """Let go of the transport at once; it reports its end soon."""
-        transport, self._transport = self._transport, None
+        transport, self.transport = self.transport, None
         if transport is not None:
             self._tell_let_go(transport)
             transport.abort()
@@ -164,7 +161,7 @@ class Port:
         """
         if self.is_stuck:
             self.hang_up()
-        transport, self._transport = self._transport, None
+        transport, self.transport = self.transport, None
         end = self._end
         if transport is not None and end is not None:
             self._tell_let_go(transport)
@@ -175,9 +172,9 @@ class Port:
         """Send what waits, and let go of the transport; False if it has not reported its end within a second or so."""
         if self._end is None:
             return True
-        if self._transport is not None:
-            self._tell_let_go(self._transport)
-            self._transport.close()
+        if self.transport is not None:
+            self._tell_let_go(self.transport)
+            self.transport.close()
         abort = self._loop.call_later(_CLOSE_GRACE_S, self.hang_up)
         try:
             await asyncio.wait([self._end], timeout=_CLOSE_GRACE_S + _ABORT_GRACE_S)

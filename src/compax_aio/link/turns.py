@@ -112,7 +112,7 @@ class Turns:
 
     def put(self, exchange: Exchange) -> None:
         """Queue *exchange*, and write it if the line is free; what need not wait is not queued at all."""
-        if self.is_free and self.queue.lets_pass and self._port.is_there and not self._is_ended:
+        if self.is_free and self.queue.lets_pass and self._port.transport is not None and not self._is_ended:
             self._begin(exchange)
             if self._protocol.is_busy:
                 return
@@ -123,7 +123,12 @@ class Turns:
 
     def say_ahead(self, stop: Exchange) -> None:
         """Write *stop*, which waits for the next line, on one that is about to be let go of."""
-        if self._port.is_there and self._protocol.in_doubt and not self._protocol.is_busy and not self._port.is_stuck:
+        if (
+            self._port.transport is not None
+            and self._protocol.in_doubt
+            and not self._protocol.is_busy
+            and not self._port.is_stuck
+        ):
             self._send_ahead(stop)
 
     def until_in_step(self) -> asyncio.Future[None]:
@@ -204,7 +209,7 @@ class Turns:
     def pump(self) -> None:
         """Send what is next, if the line is free."""
         protocol = self._protocol
-        while self._port.is_there and not (self._is_ended or protocol.is_busy or self._is_reading):
+        while self._port.transport is not None and not (self._is_ended or protocol.is_busy or self._is_reading):
             if protocol.in_doubt:
                 if not self._pursue_doubt():
                     if not self._grace.is_running:
@@ -222,7 +227,7 @@ class Turns:
         exchange.is_on_wire = True
         self._flush(Way.TURN, exchange)
         self._began_at = self._loop.time()
-        self._give_time()
+        self._give_time(self._began_at)
         if exchange.on_sent is not None:
             exchange.on_sent()
 
@@ -230,14 +235,14 @@ class Turns:
         if data := self._protocol.bytes_to_send():
             goes_on = way is Way.GOES_ON
             self.lines_sent += not goes_on
-            if self._telling.is_heard and self._port.is_there:
+            if self._telling.is_heard and self._port.transport is not None:
                 self._telling.tell(Sent(data, exchange.number if exchange is not None else None, way))
             self._port.write(data, goes_on=goes_on)
 
-    def _give_time(self) -> None:
+    def _give_time(self, begin: float | None = None) -> None:
         patience_s = self._protocol.patience_s
         self._patience_s = self._answer_timeout_s if patience_s is None else patience_s
-        self._deadline.put_off(self._patience_s)
+        self._deadline.put_off_to((self._loop.time() if begin is None else begin) + self._patience_s)
 
     def _take_events(self) -> None:
         # Nothing new is sent until every event is dealt with: a turn that began in between would get their answers.

@@ -21,11 +21,6 @@ def readable(data: bytes) -> str:
     return data.decode("latin-1").translate(_PICTURES)
 
 
-def _text(data: bytes) -> str:
-    """Copy what counts of *data*: bytes that were read may hold on to all of the room they were read into."""
-    return data[:_BYTES_AN_ENTRY].decode("latin-1")
-
-
 class WireHistory:
     """A ring of what went out (→) and came in (←), with the loop's time; pieces of one direction are joined."""
 
@@ -33,7 +28,11 @@ class WireHistory:
 
     def __init__(self) -> None:
         self._entries: list[tuple[float, str, str]] = []
-        """When, which way, and the first of it, a character for a byte."""
+        """
+        When, which way, and the first of it, a character for a byte.
+
+        Never the bytes themselves: those that were read may hold on to all of the room they were read into.
+        """
 
     def sent(self, at: float, data: bytes, *, goes_on: bool = False) -> None:
         """Note bytes that went out; where they go on with what was sent before, beside its answer, they are joined."""
@@ -54,11 +53,12 @@ class WireHistory:
     def _add(self, at: float, arrow: str, data: bytes) -> None:
         if len(self._entries) == _ENTRIES:
             del self._entries[0]
-        self._entries.append((at, arrow, _text(data)))
+        self._entries.append((at, arrow, data[:_BYTES_AN_ENTRY].decode("latin-1")))
 
     def _join(self, place: int, data: bytes) -> None:
         first_at, arrow, before = self._entries[place]
-        self._entries[place] = (first_at, arrow, (before + _text(data))[:_BYTES_AN_ENTRY])
+        text = data[:_BYTES_AN_ENTRY].decode("latin-1")
+        self._entries[place] = (first_at, arrow, (before + text)[:_BYTES_AN_ENTRY])
 
     def received_since_sent(self) -> str | None:
         """Return what came in since something was last sent, readable; None if nothing did."""
