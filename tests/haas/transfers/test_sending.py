@@ -186,6 +186,19 @@ def test_a_reader_that_is_off_when_only_the_end_of_the_block_has_to_leave_proves
     assert bench.strategy.proof == "reader off seen"
 
 
+def test_the_end_of_the_block_is_written_though_the_reader_is_off_already() -> None:
+    data = b"%\r\nO00077\r\nN10 G0 X1.\r\nM30\r\n%\r\n"
+    for signs, proof in ((DC3, "reader off seen"), (DC3 + DC1, "left the line")):
+        bench = sending("dc codes", data, most_unsent_bytes=1)
+        while bench.sent != data[:-1]:
+            bench.wait(0.5 / RATE)
+        bench.wait(0.9 / RATE)
+        bench.come(signs)
+        assert bench.wait_for_end() is Ending.COMPLETE
+        assert bench.sent == data
+        assert bench.strategy.proof == proof
+
+
 def test_a_dc3_that_comes_before_the_percent_sign_has_left_proves_nothing() -> None:
     data = b"%\r\nN1 V100\r\n%\r\n"
     bench = sending("dc codes", data)

@@ -267,22 +267,25 @@ class SendByDcCodes(SendFile):
         self._is_reader_off = False
 
     def _off(self) -> None:
-        if self.phase is Phase.TAIL and self._level.unsent() <= self._behind_percent:
+        # The end of the block with the last % may be still to be written then: it follows all the same.
+        if self.phase in {Phase.BODY, Phase.TAIL} and self.left_bytes >= len(self._data) - self._behind_percent:
             self._is_reader_off = True
-            if not self._is_leaving:
-                self._pause_s = _SETTLE_S
-                self._has_moved = True
+            self._settle(_SETTLE_S)
         else:
             super()._off()
 
     def _on(self) -> None:
-        if self.phase is Phase.TAIL and self._is_reader_off:
+        if self._is_reader_off and self.phase is not Phase.DONE:
             self._is_reader_off = False
-            if not self._is_leaving:
-                self._all_has_left()
-                self._has_moved = True
+            self._settle(self.patience.reader_off_s)
         else:
             super()._on()
+
+    def _settle(self, pause_s: float) -> None:
+        """Wait so long, if all has left."""
+        if self.phase is Phase.TAIL and not self._is_leaving:
+            self._pause_s = pause_s
+            self._has_moved = True
 
     def _all_has_left(self) -> None:
         self._pause_s = _SETTLE_S if self._is_reader_off else self.patience.reader_off_s
