@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 from tests.simulator.haas.host import Host
 
@@ -78,15 +80,34 @@ def test_a_control_that_loses_power_cannot_tell_the_host() -> None:
 # Hands
 
 
-def test_recv_is_pressed_after_a_second_on_the_line() -> None:
-    host = Host(press="recv")
+@pytest.mark.parametrize(
+    ("knobs", "after_s"),
+    [
+        ({}, 0.0),
+        ({"profile": "rts/cts"}, 0.0),
+        ({"xon_at_start": True}, 1.0),
+        ({"profile": "dc codes"}, 1.0),
+        ({"profile": "xmodem", "press_after_s": 5.0}, 5.0),
+    ],
+)
+def test_recv_is_pressed_when_somebody_comes_or_after_a_while_if_a_sign_tells_it(
+    knobs: dict[str, Any], after_s: float
+) -> None:
+    host = Host(press="recv", **knobs)
     host.wait(100.0)
     assert host.control.doing == "nothing"
     host.control.connect(host.now)
-    host.wait(0.9)
-    assert host.control.doing == "nothing"
-    host.wait(0.2)
+    if after_s:
+        host.wait(after_s - 0.1)
+        assert host.control.doing == "nothing"
+    host.wait(0.1)
     assert host.control.doing == "receiving programs"
+
+
+def test_keys_that_were_pressed_are_not_pressed_again() -> None:
+    host = Host(press="recv")
+    host.control.connect(host.now)
+    host.wait()
     host.send(_FILE)
     host.wait(100.0)
     assert host.control.doing == "nothing"
@@ -96,9 +117,8 @@ def test_recv_is_pressed_after_a_second_on_the_line() -> None:
 
 
 def test_what_was_received_is_sent_back_to_be_compared() -> None:
-    host = Host(press="recv,send:last", press_after_s=2.0)
+    host = Host(press="recv,send:last", press_pause_s=2.0)
     host.control.connect(host.now)
-    host.wait(2.0)
     host.send(_FILE)
     assert host.wait(1.9) == b""
     assert host.wait(0.2) == b"\r\n%\r\nO00077\r\nM30\r\n\r\n%\r\n"
@@ -107,11 +127,12 @@ def test_what_was_received_is_sent_back_to_be_compared() -> None:
 def test_keys_are_pressed_again_and_again() -> None:
     host = Host(press="send:O00010,send:settings", press_again=True)
     host.control.connect(host.now)
-    assert [b"O00010" in host.wait(1.0) for _ in range(4)] == [True, False, True, False]
+    assert b"O00010" in host.wait(1.0)
+    assert [b"O00010" in host.wait(3.0) for _ in range(4)] == [False, True, False, True]
 
 
 def test_all_keys_can_be_pressed() -> None:
-    host = Host(press="send:O77,send:last,cycle,dnc,recv:offsets")
+    host = Host(press="send:O77,send:last,cycle,dnc,recv:offsets", press_pause_s=1.0)
     host.control.connect(host.now)
     assert host.wait(1.5) == b""
     assert "there is no program 'O77'" in host.texts(LogKind.KEY)[0]
@@ -128,10 +149,10 @@ def test_all_keys_can_be_pressed() -> None:
 def test_after_power_on_hands_begin_anew() -> None:
     host = Host(press="recv")
     host.control.connect(host.now)
+    host.control.power_off(host.now)
     host.wait(1.0)
-    host.control.power_cycle(host.now)
-    assert host.control.doing == "nothing"
-    host.wait(1.0)
+    assert host.control.doing == "off"
+    host.control.power_on(host.now)
     assert host.control.doing == "receiving programs"
 
 

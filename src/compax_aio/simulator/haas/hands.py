@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from math import inf
-from typing import Protocol
+from typing import Final, Protocol
+
+from compax_aio.haas.facts.port_settings import Synchronization
 
 from .knobs import Knobs
 from .presses import Press, presses_of
 
 __all__ = ["Hands", "Panel"]
+
+_WAITING: Final = frozenset({"recv", "dnc"})
+_WITHOUT_SIGN: Final = frozenset({Synchronization.XON_XOFF, Synchronization.RTS_CTS})
+"""With these a control does not say that it waits."""
 
 
 class Panel(Protocol):
@@ -30,7 +36,11 @@ class Hands:
     def __init__(self, knobs: Knobs, panel: Panel) -> None:
         self._panel = panel
         self._presses = presses_of(knobs.press)
-        self._after_s = knobs.press_after_s
+        self._first_after_s = knobs.press_after_s
+        self._pause_s = knobs.press_pause_s
+        first = self._presses[0].key if self._presses else ""
+        if first in _WAITING and knobs.mode in _WITHOUT_SIGN and not knobs.xon_at_start:
+            self._first_after_s = 0.0  # whoever sends earlier than that sends to nobody
         self._again = knobs.press_again
         self._next = 0
         self._at = inf
@@ -39,7 +49,7 @@ class Hands:
     def begin(self, now: float) -> None:
         """Begin with the first key, if there is any."""
         self._next = 0
-        self._at = now + self._after_s if self._presses else inf
+        self._at = now + self._first_after_s if self._presses else inf
         self._has_begun = True
 
     def somebody_came(self, now: float) -> None:
@@ -50,7 +60,7 @@ class Hands:
     def over(self, now: float) -> None:
         """Take note that what a key has begun is over."""
         if self._next < len(self._presses):
-            self._at = now + self._after_s
+            self._at = now + self._pause_s
 
     def next_at(self) -> float:
         """When the next key is pressed."""

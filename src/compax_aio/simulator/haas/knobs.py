@@ -258,7 +258,9 @@ class Knobs:
     """Keys that press themselves, each after the operation before is over: recv, recv:settings, send:O00010, send:ALL,
     send:last, dnc, cycle; several with commas."""
     press_after_s: _Seconds = 1.0
-    """From the begin, or from the end of an operation, to the next key."""
+    """From the first connection to the first key; recv and dnc come at once where no sign tells the host to begin."""
+    press_pause_s: _Seconds = 3.0
+    """From the end of an operation to the next key."""
     press_again: bool = False
     """After the last key the first one follows."""
     program_blocks: Annotated[int, Range(1, 1_000_000)] = 12
