@@ -17,6 +17,7 @@ from ..link.contract import Event
 from ..link.link import LinkStats
 from ..link.reconnecting import Restored
 from ..motion.events import EventHub, EventStream
+from .asking import Asking
 from .collecting import Collecting
 from .events import ConnectionLost, ConnectionRestored, Overheard, Printed, ReaderOff, ReaderOn
 from .facts.data_files import DataKind
@@ -30,7 +31,6 @@ from .protocol_events import Overheard as OverheardOnLine
 from .protocol_events import Printed as PrintedOnLine
 from .protocol_events import ReaderOff as ReaderOffOnLine
 from .protocol_events import ReaderOn as ReaderOnOnLine
-from .questions import Questions
 from .receiving import Receiving
 from .reports import TransferReports
 from .sending import Sending
@@ -45,7 +45,7 @@ __all__ = ["Control"]
 _log = logging.getLogger("compax_aio.haas")
 
 
-class Control(Questions):
+class Control(Asking):
     """
     One control, open; made by :func:`compax_aio.haas.connect`.
 
