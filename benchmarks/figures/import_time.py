@@ -1,8 +1,10 @@
 """
 How long ``import compax_aio`` takes, over what asyncio takes itself, and what it pulls in.
 
-Each import is made in a fresh process, in turn with a process that imports asyncio and one that imports nothing. Costs
-are the CPU time of the whole process; modules are told by ``-X importtime``, which takes time itself.
+What is put off until it is used has to be paid then: so the same is measured with the names that a program needs to
+connect, and of a whole program, from its start to its first position, beside one that asks through asyncio's streams.
+Each is a fresh process, all in turn; costs are CPU times of the whole process. Modules are told by ``-X importtime``,
+which takes time itself.
 """
 
 from __future__ import annotations
@@ -21,7 +23,8 @@ from statistics import median
 from tempfile import TemporaryDirectory
 from typing import Final
 
-from ..measuring import Effort, Figure, Measured, Row, at_most, interleaved, spread_of
+from ..far_ends.canned import HOST
+from ..measuring import Effort, Figure, Measured, Results, Row, Target, at_most, far_end, interleaved
 from ..measuring.callgrind import count_whole, is_installed
 
 __all__ = ["HEAVY", "heavy_in", "measure", "own_times"]
@@ -51,17 +54,45 @@ HEAVY: Final = (
 )
 """What nobody who moves a drive needs: other devices, the command line, the far end, and what plots, draws or tests."""
 
-_PROGRAMS: Final = {"nothing": "pass", "asyncio": "import asyncio", "compax_aio": "import asyncio, compax_aio"}
-_LIST: Final = """
-import asyncio, json, sys
-before = set(sys.modules)
-import compax_aio
-print(json.dumps(sorted(set(sys.modules) - before)))
+_NOTHING: Final = "pass"
+_ASYNCIO: Final = "import asyncio"
+_IMPORT: Final = "import asyncio, compax_aio"
+_NAMES: Final = "import asyncio; from compax_aio import Drive, DriveGroup, Move, connect"
+_STREAMS: Final = """
+import asyncio
+async def main():
+    reader, writer = await asyncio.open_connection({host!r}, {port})
+    writer.write(b"S1\\r")
+    assert await reader.readuntil(b">")
+    writer.close()
+asyncio.run(main())
 """
+_POSITION: Final = """
+import asyncio, compax_aio
+async def main():
+    async with compax_aio.connect("tcp://{host}:{port}") as drive:
+        assert await drive.position()
+asyncio.run(main())
+"""
+_LISTED: Final = """
+import json, sys
+print(json.dumps(sorted(sys.modules)))
+"""
+_SHORT: Final = {
+    _NOTHING: "python -c pass",
+    _ASYNCIO: _ASYNCIO,
+    _IMPORT: "import compax_aio",
+    _NAMES: "from compax_aio import connect, Drive, DriveGroup, Move",
+    _STREAMS: "a program's first position, asyncio streams",
+    _POSITION: "a program's first position, compax_aio",
+}
+"""Programs as they are told."""
+
 _LINE: Final = re.compile(r"import time:\s*(\d+) \|\s*\d+ \|\s*(\S+)")
 _CPU_MS: Final = "CPU ms"
 _WALL_MS: Final = "wall ms"
 _TOP: Final = 8
+_TARGET: Final = at_most(60)
 
 
 Environment = Mapping[str, str]
@@ -75,7 +106,7 @@ def _compiled() -> Iterator[Environment]:
         yield {**environment, "PYTHONPYCACHEPREFIX": folder}
 
 
-def _import_in_fresh_process(program: str, environment: Environment) -> Measured:
+def _in_fresh_process(program: str, environment: Environment) -> Measured:
     wall = time.perf_counter()
     process = subprocess.Popen([sys.executable, "-c", program], env=environment)
     _, status, usage = os.wait4(process.pid, 0)
@@ -106,15 +137,15 @@ def _run(environment: Environment, *arguments: str) -> subprocess.CompletedProce
     return subprocess.run([sys.executable, *arguments], env=environment, check=True, capture_output=True, text=True)
 
 
-def _imported(environment: Environment) -> list[str]:
-    listed = _run(environment, "-c", _LIST)
-    modules: list[str] = json.loads(listed.stdout)
-    return modules
+def _modules(environment: Environment, program: str) -> set[str]:
+    """Say what is imported when *program* has run."""
+    modules: list[str] = json.loads(_run(environment, "-c", program + _LISTED).stdout)
+    return set(modules)
 
 
-def _pulled_in(imported: Sequence[str], environment: Environment) -> tuple[Sequence[Row], Sequence[Row]]:
-    """Tell what compax_aio pulls in beside asyncio, by package; and those of its modules that take longest."""
-    own = own_times(_run(environment, "-X", "importtime", "-c", _PROGRAMS["compax_aio"]).stderr)
+def _pulled_in(environment: Environment, program: str, imported: set[str]) -> tuple[Sequence[Row], Sequence[Row]]:
+    """Tell what *imported* takes when *program* runs, by package, and which modules take longest."""
+    own = own_times(_run(environment, "-X", "importtime", "-c", program).stderr)
     added = {module: own[module] for module in imported if module in own}
     modules = Counter(map(_package_of, added))
     times = {each: sum(ms for module, ms in added.items() if _package_of(module) == each) for each in modules}
@@ -127,63 +158,72 @@ def _pulled_in(imported: Sequence[str], environment: Environment) -> tuple[Seque
 
 
 def _instructions(effort: Effort, environment: Environment) -> Figure:
-    name = "instructions of import compax_aio over asyncio's own"
+    name = f"instructions of {_SHORT[_NAMES]} over asyncio's own"
     if effort.name == "least" or not is_installed():
         why = "valgrind is not installed" if not is_installed() else "not with the least effort"
         return Figure(name=name, value=None, notes=[why])
-    counted = {
-        each: count_whole(["-c", _PROGRAMS[each]], environment).instructions for each in ("asyncio", "compax_aio")
-    }
+    counted = {each: count_whole(["-c", each], environment).instructions / 1e6 for each in (_ASYNCIO, _NAMES)}
     return Figure(
         name=name,
-        value=(counted["compax_aio"] - counted["asyncio"]) / 1e6,
+        value=counted[_NAMES] - counted[_ASYNCIO],
         unit="million",
         ratio_of="asyncio's",
         rows=[
-            Row(name=each, value=count / 1e6, unit="million", ratio=count / counted["asyncio"])
+            Row(name=_SHORT[each], value=count, unit="million", ratio=count / counted[_ASYNCIO])
             for each, count in counted.items()
         ],
     )
 
 
-def measure(effort: Effort) -> Sequence[Figure]:
-    """Measure imports in fresh processes."""
-    with _compiled() as environment:
-        results = interleaved(
-            effort,
-            {name: partial(_import_in_fresh_process, program, environment) for name, program in _PROGRAMS.items()},
-        )
-        modules = _imported(environment)
-        packages, longest = _pulled_in(modules, environment)
-        instructions = _instructions(effort, environment)
-    mine, base = (results.values[each][_CPU_MS] for each in ("compax_aio", "asyncio"))
-    over = [one - other for one, other in zip(mine, base, strict=True)]
-    heavy = heavy_in(modules)
+def _over(
+    results: Results, program: str, base: str, *, target: Target | None = None, rows: Sequence[Row] = (), note: str = ""
+) -> Figure:
+    mine, others = (results.values[each][_CPU_MS] for each in (program, base))
+    over = [one - other for one, other in zip(mine, others, strict=True)]
     steps = [
         Row(
-            name=_PROGRAMS[each],
+            name=_SHORT[each],
             value=results.median(each, _CPU_MS),
             unit=_CPU_MS,
             spread=results.spread(each, _CPU_MS),
             note=f"{results.median(each, _WALL_MS):.0f} ms on the wall",
         )
-        for each in _PROGRAMS
+        for each in (base, program)
     ]
+    return Figure(
+        name=f"{_SHORT[program]}, over {_SHORT[base]}",
+        value=median(over),
+        unit="ms",
+        target=target,
+        rows=[*steps, *rows],
+        notes=[note] if note else [],
+    )
+
+
+def measure(effort: Effort) -> Sequence[Figure]:
+    """Measure imports and first positions in fresh processes."""
+    with _compiled() as environment, far_end("benchmarks.far_ends.canned", "0") as far:
+        streams, position = (each.format(host=HOST, port=far.where["tcp"]) for each in (_STREAMS, _POSITION))
+        programs = {_NOTHING: _NOTHING, _ASYNCIO: _ASYNCIO, _IMPORT: _IMPORT, _NAMES: _NAMES}
+        programs |= {_STREAMS: streams, _POSITION: position}
+        results = interleaved(
+            effort, {name: partial(_in_fresh_process, program, environment) for name, program in programs.items()}
+        )
+        before = _modules(environment, _ASYNCIO)
+        packages, longest = _pulled_in(environment, _NAMES, _modules(environment, _NAMES) - before)
+        used = _modules(environment, position) - before
+        instructions = _instructions(effort, environment)
+    heavy = heavy_in(used)
+    compiled = "of the CPU, in processes of their own, with compiled modules at hand"
     return [
-        Figure(
-            name="import compax_aio over asyncio's own",
-            value=median(over),
-            unit="ms",
-            target=at_most(60),
-            spread=spread_of(over),
-            rows=[*steps, *packages, *longest],
-            notes=["of the CPU, in processes of their own, with compiled modules at hand"],
-        ),
+        _over(results, _IMPORT, _ASYNCIO, target=_TARGET, note=compiled),
+        _over(results, _NAMES, _ASYNCIO, target=_TARGET, rows=[*packages, *longest]),
+        _over(results, _POSITION, _STREAMS),
         instructions,
         Figure(
-            name="heavy modules that import compax_aio pulls in",
+            name="heavy modules when a first position was read",
             value=len(heavy),
             target=at_most(0, "none"),
-            notes=[", ".join(heavy) if heavy else f"{len(modules)} modules beside asyncio's, none heavy"],
+            notes=[", ".join(heavy) if heavy else f"{len(used)} modules beside asyncio's, none heavy"],
         ),
     ]

@@ -329,9 +329,9 @@ def _figure(medium: str, loop: str, ours: Peer, peers: Sequence[Peer], results: 
     closest = min(ratios, key=ratios.__getitem__) if ratios else None
     rows = [_row(each, results) for each in (ours, *peers)]
     rows += [Row(name=each.name, value=None, unit=CPU_US, note="not installed") for each in missing]
-    what = "with the event loop blocked meanwhile" if block else "awaited"
+    what = "others that block the event loop" if block else "others that are awaited"
     return Figure(
-        name=f"a position on {medium}, {loop}, the cheapest of {len(peers)} others, {what}",
+        name=f"a position on {medium}, {loop}: the cheapest of {what}",
         value=ratios[closest] if closest else None,
         unit="times our CPU",
         target=above(1.0),

@@ -17,7 +17,9 @@ from .spread import spread_of
 __all__ = ["Machine", "Noise", "version"]
 
 _CPUINFO: Final = Path("/proc/cpuinfo")
-_PIECE: Final = 20_000
+_PIECE: Final = 200_000
+_QUIET_LOAD: Final = 1.25
+"""Of each core: who measures and his far end share two."""
 
 
 def version(package: str) -> str | None:
@@ -92,13 +94,25 @@ def _fixed_work() -> int:
 
 @dataclass(slots=True)
 class Noise:
-    """How long the same piece of work took, again and again: its own time (CPU), and that on the wall."""
+    """
+    How long the same piece of work took, again and again.
+
+    Attributes:
+        cpu_s: Its own time, of the CPU.
+        wall_s: Its time on the wall.
+        load: How many processes wanted to run in the minute before, on average, where that is told.
+        cores: How many could.
+    """
 
     cpu_s: list[float] = field(default_factory=list)
     wall_s: list[float] = field(default_factory=list)
+    load: list[float] = field(default_factory=list)
+    cores: int = field(default_factory=_usable_cores)
 
     def sample(self) -> None:
-        """Do the work once more; takes a millisecond or two."""
+        """Do the work once more; takes some milliseconds."""
+        if hasattr(os, "getloadavg"):
+            self.load.append(os.getloadavg()[0])
         wall, cpu = time.perf_counter(), time.thread_time()
         _fixed_work()
         self.cpu_s.append(time.thread_time() - cpu)
@@ -117,7 +131,13 @@ class Noise:
     @property
     def is_quiet(self) -> bool:
         """Whether times on the wall can be believed, not only ratios of CPU times."""
-        return bool(self.cpu_s) and self.cpu_spread <= 0.03 and self.waiting_share <= 0.03
+        steady = bool(self.cpu_s) and self.cpu_spread <= 0.03 and self.waiting_share <= 0.03
+        return steady and self.most_load <= _QUIET_LOAD * self.cores
+
+    @property
+    def most_load(self) -> float:
+        """The highest load that was seen; what is measured makes one or two of it itself."""
+        return max(self.load, default=0.0)
 
     def told(self) -> str:
         """Say it in a line."""
@@ -126,7 +146,7 @@ class Noise:
         return (
             f"noise: the same work, {len(self.cpu_s)} times: {1000 * median(self.cpu_s):.2f} ms of CPU "
             f"± {self.cpu_spread:.1%} (slowest {max(self.cpu_s) / median(self.cpu_s):.2f} times that), "
-            f"{self.waiting_share:.1%} of the time something else had the core: "
+            f"{self.waiting_share:.1%} of the time something else had the core, load up to {self.most_load:.1f}: "
             + ("quiet" if self.is_quiet else "NOISY, believe ratios and counts only")
         )
 
@@ -137,5 +157,6 @@ class Noise:
             "cpu_s_median": median(self.cpu_s) if self.cpu_s else None,
             "cpu_spread": self.cpu_spread,
             "waiting_share": self.waiting_share,
+            "most_load": self.most_load,
             "is_quiet": self.is_quiet,
         }

@@ -49,3 +49,9 @@ def test_a_sample_is_taken() -> None:
     assert noise.told() == "noise not measured"
     noise.sample()
     assert noise.cpu_s[0] > 0
+    assert len(noise.load) == len(noise.wall_s) == 1
+
+
+def test_a_machine_on_which_more_wants_to_run_than_has_cores_is_not_quiet() -> None:
+    assert Noise(cpu_s=[0.001], wall_s=[0.001], load=[0.5, 2.5], cores=2).is_quiet
+    assert not Noise(cpu_s=[0.001], wall_s=[0.001], load=[0.5, 2.6], cores=2).is_quiet
