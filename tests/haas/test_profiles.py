@@ -153,7 +153,13 @@ def test_a_line_on_which_the_control_cannot_be_is_refused() -> None:
 def test_how_fast_a_line_is_is_known_where_it_is_said() -> None:
     assert bytes_per_s(completed(PORT, CLASSIC), CLASSIC, None) == 9600 / 11
     assert bytes_per_s("sim://haas?baudrate=4800", CLASSIC, None) == 4800 / 11
-    assert bytes_per_s("tcp://host:4001", CLASSIC, None) is None
+    assert bytes_per_s("loop://control", CLASSIC, None) is None
     assert bytes_per_s("tcp://host:4001", CLASSIC, 19200) == 19200 / 11
     assert bytes_per_s("sim://haas?baudrate=no", NEXT_GENERATION, None) is None
     assert bytes_per_s(PORT, Profile(name="x"), None) == 9600 / 11
+
+
+def test_behind_a_network_a_line_is_as_fast_as_the_control_so_that_nothing_gathers_on_the_way() -> None:
+    assert bytes_per_s("tcp://host:4001", CLASSIC, None) == 9600 / 11
+    assert bytes_per_s("tls://host:4001", CLASSIC_XMODEM, None) == 11520
+    assert bytes_per_s("tcp://host:5051", NEXT_GENERATION, None) is None

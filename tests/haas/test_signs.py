@@ -28,7 +28,8 @@ def test_with_dc_codes_they_tell_of_the_reader() -> None:
 def test_otherwise_they_are_bytes_like_others(profile: Profile) -> None:
     signs = FlowSigns(profile)
     assert signs.take(b"A\x13\x11") == (b"A\x13\x11", [])
-    assert not (signs.is_held or signs.is_reader_on)
+    assert not signs.is_held
+    assert not signs.is_reader_on
 
 
 def test_a_new_line_is_not_held() -> None:

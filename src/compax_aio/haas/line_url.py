@@ -14,6 +14,8 @@ from .profiles import Profile
 __all__ = ["bytes_per_s", "completed", "profile_for"]
 
 _SCHEMES_OF_PORTS: Final = frozenset({"serial", "rfc2217"})
+_SCHEMES_OF_NETWORKS: Final = frozenset({"tcp", "tls", "unix"})
+"""Behind these there is a port that has the speed of the control, or nothing would be understood."""
 _PARITIES: Final = {"none": "N", "even": "E", "odd": "O", "zero": "N"}
 """As the port has them; ``zero`` is an eighth data bit that is always 0, which not every port has as a parity."""
 _WORDS: Final = {"N": "none", "E": "even", "O": "odd", "S": "zero"}
@@ -115,12 +117,15 @@ def bytes_per_s(url: str, profile: Profile, baud_rate: int | None) -> float | No
     Args:
         url: Of the line, completed.
         profile: Says how many bits a character has.
-        baud_rate: As the user has set it; None: the URL's.
+        baud_rate: As the user has set it; None: the URL's, or behind a network the control's own: faster than that
+            bytes would only gather in a terminal server, where they cannot be held back after an Xoff.
     """
     bits = profile.bits_per_character or 11
     if baud_rate is not None:
         return baud_rate / bits
     parsed = TransportURL.parse(url)
+    if parsed.scheme in _SCHEMES_OF_NETWORKS:
+        return None if profile.baudrate is None else profile.baudrate / bits
     if parsed.scheme not in _SCHEMES_OF_PORTS and "baudrate" not in parsed.query:
         return None
     try:
