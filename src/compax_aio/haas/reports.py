@@ -69,6 +69,7 @@ _STORIES: Final[Mapping[Ending, tuple[type[CompaxError], str, str]]] = {
         "ControlSettings.max_bytes says how many that is; what still comes is dropped",
     ),
     Ending.GIVEN_UP: (ConnectionLostError, "the transfer was given up", f"begin anew; {_SCREEN}"),
+    Ending.LINE_LOST: (ConnectionLostError, "the line was lost", f"begin anew; {_SCREEN}"),
 }
 
 
@@ -135,11 +136,10 @@ class TransferReports:
         more = f" ({detail})" if detail else ""
         return self._of(kind_of_error, f"{what.format_map(words)}{more}; {account}", account, hint.format_map(words))
 
-    def lost(self, account: TransferAccount, cause: CompaxError | None) -> ConnectionLostError:
+    def lost(self, account: TransferAccount, cause: CompaxError) -> ConnectionLostError:
         """Report a transfer whose line was lost, or closed."""
-        why = "the line was lost" if cause is None else cause.what
         hint = f"a transfer is never resumed: begin anew when the line is back; {_SCREEN}"
-        error = self._of(ConnectionLostError, f"{why}; {account}", account, hint)
+        error = self._of(ConnectionLostError, f"{cause.what}; {account}", account, hint)
         error.__cause__ = cause
         return error
 

@@ -278,8 +278,6 @@ class Transferring(ABC, Generic[_ResultT]):
             raise self._reports.lost(self.account(), error) from error
         finally:
             self._ask_nothing()
-        if account.ending is Ending.LINE_LOST:
-            raise self._reports.lost(self.account(), None)
         if account.ending is not Ending.COMPLETE:
             assert account.ending is not None
             raise self._reports.of_ending(account.ending, self.account(), account.detail)
@@ -298,8 +296,13 @@ class Transferring(ABC, Generic[_ResultT]):
             return None
         future: asyncio.Future[object] = asyncio.ensure_future(answer)
         self._operators.add(future)
-        future.add_done_callback(self._operators.discard)
+        future.add_done_callback(self._operator_is_through)
         return future
+
+    def _operator_is_through(self, future: asyncio.Future[object]) -> None:
+        self._operators.discard(future)
+        if not future.cancelled() and (error := future.exception()) is not None:
+            _log.warning("%s: on_operator has failed: %r", self._line.name, error)
 
     async def _until_done_there(self, answer: asyncio.Future[object]) -> None:
         """Wait until the operator has said that it is done."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from .comparing import Difference, ProgramDifference, diff, first_difference
+from .comparing import Difference, diff
 from .language.data_file import DataFile
 from .language.program_file import ProgramFile
 from .transfer import Kind
@@ -27,7 +27,7 @@ class Verified:
 
     equal: Literal["byte for byte", "in content", "no"]
     """``in content``: spaces, ends of blocks, or the checksum N0 of the control are others, and nothing else."""
-    differences: tuple[Difference | ProgramDifference, ...] = ()
+    differences: tuple[Difference, ...] = ()
     """What is not equal; of programs, where it begins."""
     proves: str
     """In words."""
@@ -58,15 +58,7 @@ def verified_sent(sent: ProgramFile | DataFile, back: ProgramFile | DataFile) ->
     """Compare what was sent with what the control sends back; for a thread, for it may be large."""
     if sent.payload == back.payload:
         return Verified(equal="byte for byte", proves="the control has sent back the same bytes: it has stored them")
-    differences: tuple[Difference | ProgramDifference, ...]
-    if isinstance(sent, ProgramFile) and isinstance(back, ProgramFile):
-        first = first_difference(sent, back)
-        differences = () if first is None else (first,)
-    else:
-        assert isinstance(sent, DataFile)
-        assert isinstance(back, DataFile)  # one kind is received as it was sent
-        differences = diff(sent, back)
-    if differences:
+    if differences := diff(sent, back):
         said = f"the control has something else stored: {'; '.join(map(str, differences[:_MOST_TOLD]))}"
         more = f" and {len(differences) - _MOST_TOLD} more" if len(differences) > _MOST_TOLD else ""
         return Verified(equal="no", differences=differences, proves=said + more)
