@@ -356,6 +356,16 @@ def test_a_question_that_is_owed_itself_is_not_asked_before_that_is_settled() ->
     assert protocol.bytes_to_send() == b"Q100\r\n"
 
 
+def test_an_answer_that_says_nothing_of_what_it_answers_does_not_show_that_nothing_is_owed() -> None:
+    protocol = owing("Q500")
+    protocol.send("Q500")
+    protocol.time_ran_out()
+    protocol.bytes_to_send()
+    protocol.receive(framed("STATUS, BUSY") * 2)
+    assert told(protocol) == [LateEnding("Q500", Answered("STATUS, BUSY")), Overheard("STATUS, BUSY")]
+    assert protocol.state is State.CATCHING_UP
+
+
 def test_when_that_is_unanswered_too_the_question_is_not_sent() -> None:
     protocol = owing("Q500")
     protocol.send("Q600 1")
