@@ -37,6 +37,8 @@ class DriveLine:
         on_restored: Called when it is back.
     """
 
+    __slots__ = ("active_seen_at", "last_position", "link", "name", "protocol", "settings", "transfer")
+
     def __init__(
         self,
         name: str,

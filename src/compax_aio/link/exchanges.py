@@ -89,6 +89,8 @@ class ExchangeQueue:
     Stops go before everything, and so does the look at who is there, whosoever they are.
     """
 
+    __slots__ = ("_parties", "_reads", "held", "is_admitted", "reads_are_held")
+
     def __init__(self) -> None:
         self.reads_are_held = False
         """While set, reads stay where they are; everything else goes on."""

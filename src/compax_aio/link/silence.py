@@ -28,6 +28,8 @@ class Silence:
         failures: Make its errors.
     """
 
+    __slots__ = ("_failures", "_loop", "_port", "_reconnecting", "error")
+
     def __init__(self, port: Port, reconnecting: Reconnecting | None, failures: Failures) -> None:
         self._port = port
         self._reconnecting = reconnecting
