@@ -661,6 +661,43 @@ async def test_who_cancels_a_send_can_use_the_line_again(mode: str, after_s: flo
         assert b.far.memory.programs["O01234"] == PROGRAM
 
 
+@pytest.mark.parametrize("way", ["receive", "send"])
+@pytest.mark.parametrize("mode", MODES)
+async def test_cancelling_is_safe_at_every_step(mode: str, way: str, tmp_path: Path) -> None:
+    text = program_of(60)
+    settings = ControlSettings(tail_s=0.1, quiet_s=0.05, block_timeout_s=0.05)
+    async with bench(MODES[mode], baudrate=0, settings=settings, nak_every_s=0.05) as b:
+        steps, is_through = 0, False
+        while not is_through:
+            b.far.memory.programs["O01234"] = text
+            if way == "receive":
+                transfer: Any = b.control.receive_program(archive=tmp_path / "a.nc")
+                asyncio.get_running_loop().call_later(0.1, b.far.press_send, "O01234")
+            else:
+                b.far.press_recv()
+                transfer = b.control.send_program(text)
+            for _ in range(steps):
+                await _one_step()
+            is_through = transfer.done()
+            transfer.cancel()
+            await asyncio.wait([transfer])
+            await asyncio.sleep(1)
+            b.far.press_reset()
+            steps += 1
+            await asyncio.sleep(1)
+        assert steps > 10
+        assert isinstance(await _received(b), Received)
+
+
+async def _one_step() -> None:
+    """Let the event loop run once, or as long as it waits for the next timer."""
+    loop = asyncio.get_running_loop()
+    before = loop.time()
+    await asyncio.sleep(0)
+    if loop.time() == before:
+        await asyncio.sleep(0.002)
+
+
 async def test_leaving_the_block_cancels_what_is_under_way() -> None:
     async with bench() as b:
         async with b.control as control:
@@ -766,6 +803,9 @@ async def test_progress_of_what_is_sent_knows_how_much_there_is() -> None:
         seen = [each async for each in transfer.progress(interval_s=0.5)]
         sent = await transfer
         assert {each.total_bytes for each in seen[1:]} == {sent.bytes}
+        sizes = [each.bytes for each in seen]
+        assert sizes == sorted(sizes)
+        assert len(set(sizes)) >= 6  # three and a half seconds
         assert seen[-1].bytes == sent.bytes
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal, Protocol, TypeVar
 
@@ -45,6 +46,8 @@ be compared. ``over``: it has ended.
 _ResultT = TypeVar("_ResultT")
 
 _MOST_PLACES: Final = 20
+_LOOK_S: Final = 0.25
+"""So often it is looked how far a transfer is."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -248,14 +251,20 @@ class Transfer(asyncio.Future[_ResultT]):
         """
         if not check_number("interval_s", interval_s) >= 0:
             raise InvalidCommandError(f"interval_s is 0 or more, not {interval_s!r}")
+        told: TransferProgress | None = None
         is_last = False
         while not is_last:
             is_last = self.done()
             self._changed.clear()
-            yield self._owner.snapshot()
+            now = self._owner.snapshot()
+            if is_last or told is None or replace(now, elapsed_s=told.elapsed_s) != told:
+                told = now
+                yield now
             if not is_last and not self.done():
                 await asyncio.sleep(interval_s)
-                await self._changed.wait()
+                with suppress(TimeoutError):  # nobody tells of each byte that leaves
+                    async with asyncio.timeout(_LOOK_S):
+                        await self._changed.wait()
 
     # What the one who carries it out tells it -----------------------------------------------------------------------
 
