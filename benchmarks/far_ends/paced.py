@@ -85,7 +85,17 @@ def _answer(line: bytes) -> bytes:
 class _Connection:
     """One who has connected to a line."""
 
-    __slots__ = ("descriptor", "entry", "heard_until", "line", "move_ends_at", "said_at", "said_until", "sock")
+    __slots__ = (
+        "descriptor",
+        "entry",
+        "heard_until",
+        "line",
+        "move_ends_at",
+        "said_at",
+        "said_before",
+        "said_until",
+        "sock",
+    )
 
     def __init__(self, line: int, descriptor: int, sock: socket.socket | None = None) -> None:
         self.line = line
@@ -94,8 +104,10 @@ class _Connection:
         self.sock = sock
         """None on a pseudo-terminal."""
         self.entry = b""
-        self.heard_until = self.said_until = self.said_at = 0.0
-        """When the last byte has come, will have gone, and was released."""
+        self.heard_until = self.said_until = 0.0
+        """When the last byte has come, and will have gone."""
+        self.said_before = self.said_at = 0.0
+        """When the last but one and the last of what was said were released."""
         self.move_ends_at: float | None = None
         """None while the axis stands; a stop ends a move without ``$``."""
 
@@ -154,7 +166,7 @@ class PacedLines:
         self._idle_s = 0.0
         self._lateness = Lateness()
         self._messages: list[tuple[int, float]] = []
-        self._stops: list[tuple[int, float, float]] = []
+        self._stops: list[tuple[int, float, float, float]] = []
         self._stalled: set[int] = set()
         self._lines = 0
         self._is_wanted = True
@@ -262,7 +274,7 @@ class PacedLines:
         *lines, connection.entry = (connection.entry + data).split(b"\r")
         for line in lines:
             if line == b"STOP":
-                self._stops.append((connection.line, came_at, connection.said_at))
+                self._stops.append((connection.line, came_at, connection.said_before, connection.said_at))
                 connection.move_ends_at = None
             said = _MOVING.get(line) if connection.move_ends_at is not None else None
             self._say(connection, said or _answer(line), connection.heard_until + ANSWER_TIME_S)
@@ -282,7 +294,7 @@ class PacedLines:
         if connection.descriptor < 0:
             return
         self._lateness.note(now - at)
-        connection.said_at = now
+        connection.said_before, connection.said_at = connection.said_at, now
         if data is _MESSAGE:
             self._messages.append((connection.line, now))
         with contextlib.suppress(OSError):  # nobody takes it, or there is nobody any more: so does a wire lose it
@@ -314,7 +326,8 @@ class PacedLines:
         Tell what happened since the last time, by CLOCK_MONOTONIC, which all processes share.
 
         ``messages``: line, and when its ``$`` was about to be written, unless ``--by-byte``. ``stops``: line, when all
-        of STOP had come, and when the last byte of the answer before it was about to be written.
+        of STOP had come, and when the last byte of the last but one and of the last answer before it was about to be
+        written.
         """
         messages, self._messages = self._messages, []
         stops, self._stops = self._stops, []

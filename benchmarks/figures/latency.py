@@ -36,7 +36,7 @@ from ..far_ends.paced import EXCHANGE_S, MODULE
 from ..measuring import LOOPS, Effort, FarEnd, Figure, Row, at_most, far_end
 from ..polling import bare_lines, drives, percentile, room_for
 
-__all__ = ["CIRCUMSTANCES", "Found", "measure", "pair"]
+__all__ = ["CIRCUMSTANCES", "Found", "after_exchange", "measure", "pair"]
 
 ALONE: Final = "nobody else"
 POLLED: Final = "64 polled"
@@ -65,7 +65,7 @@ class Found:
     stops_s: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
     """From being called to the last byte."""
     after_exchange_s: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
-    """From the later of being called and the end of the exchange in flight, to the last byte."""
+    """From the end of the exchange in flight, if there was one, to the last byte."""
 
 
 def pair(here: Sequence[Event], there: Sequence[Sequence[float]]) -> list[tuple[float, Sequence[float]]]:
@@ -238,6 +238,19 @@ async def _stop_again_and_again(line: int, drive: Drive, until: float, called: l
             return
 
 
+def after_exchange(called_at: float, there_at: float, *answered_at: float) -> float:
+    """
+    Return how long a stop took from the end of the exchange in flight, or from being called if there was none.
+
+    Args:
+        called_at: When ``stop()`` was called.
+        there_at: When STOP was there.
+        answered_at: When the last answers before it were written, oldest first. The first of them behind the call ends
+            the exchange that was in flight; should STOP have waited for another one, that counts against it.
+    """
+    return there_at - next((at for at in answered_at if at > called_at), called_at)
+
+
 async def _measure_stops(far: FarEnd, stopped: Mapping[int, Drive], round_s: float) -> tuple[list[float], list[float]]:
     far.ask("happened")
     called = list[Event]()
@@ -247,8 +260,8 @@ async def _measure_stops(far: FarEnd, stopped: Mapping[int, Drive], round_s: flo
         await asyncio.gather(*(_stop_again_and_again(*each, until, called) for each in stopped.items()))
     matched = pair(called, far.ask("happened")["stops"])
     return (
-        [there_at - called_at for called_at, (there_at, _) in matched],
-        [there_at - max(called_at, answered_at) for called_at, (there_at, answered_at) in matched],
+        [there_at - called_at for called_at, (there_at, *_) in matched],
+        [after_exchange(called_at, *there) for called_at, there in matched],
     )
 
 

@@ -19,8 +19,8 @@ from benchmarks.far_ends.paced import (
     QUESTION,
     Lateness,
 )
-
 from benchmarks.measuring import FarEnd, far_end
+
 from compax_aio.compax.codecs import decode_number
 
 pytestmark = pytest.mark.real_time
@@ -174,10 +174,19 @@ def test_a_stop_ends_a_move_without_a_message_and_is_told_with_the_answer_before
         assert line.ask(b"S1") == POSITION
     happened = far.ask("happened")
     assert happened["messages"] == []
-    ((number, came_at, answered_at),) = happened["stops"]
+    ((number, came_at, *answered_at),) = happened["stops"]
     assert number == 0
-    assert answered_at < came_at
+    assert answered_at == [0.0, 0.0]  # nothing had been said on that line
     assert begun_at - 0.001 < came_at < time.monotonic()  # the kernel's time is that of another clock
+
+
+def test_a_stop_is_told_with_when_the_two_answers_before_it_were_released(line: Line, far: FarEnd) -> None:
+    line.ask(b"S1")
+    between = time.monotonic()
+    line.ask(b"S1")
+    line.ask(b"STOP")
+    ((_, came_at, *answered_at),) = far.ask("happened")["stops"]
+    assert answered_at[0] < between < answered_at[1] < came_at + 0.001
 
 
 def test_a_line_that_stalls_says_nothing_until_it_is_mended_and_the_others_go_on(line: Line, far: FarEnd) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 
 import pytest
-from benchmarks.figures.latency import _all_the_while, _names, pair
+from benchmarks.figures.latency import _all_the_while, _names, after_exchange, pair
 
 
 def test_events_of_each_line_are_matched_in_their_order() -> None:
@@ -24,6 +24,18 @@ def test_what_the_far_end_tells_besides_the_time_goes_with_it() -> None:
 def test_unequal_numbers_are_no_measurement(there: list[list[float]], said: str) -> None:
     with pytest.raises(RuntimeError, match=said):
         pair([(0, 1.5)], there)
+
+
+@pytest.mark.parametrize(
+    ("answered_at", "took"),
+    [
+        ((9.0, 9.9), 1.5),  # nothing was in flight
+        ((9.9, 11.0), 0.5),  # one exchange was
+        ((10.5, 11.4), 1.0),  # it waited for another one
+    ],
+)
+def test_a_stop_may_wait_for_one_exchange_and_no_more(answered_at: tuple[float, float], took: float) -> None:
+    assert after_exchange(10.0, 11.5, *answered_at) == pytest.approx(took)
 
 
 def test_a_thousand_reads_are_a_thousand_exchanges() -> None:

@@ -6,11 +6,10 @@ from collections.abc import Sequence
 
 import pytest
 from benchmarks.far_ends.paced import EXCHANGE_S
-from benchmarks.figures.many_lines import AT_SPEED, Found, full_speed_lines
-from benchmarks.polling import Ask, Polled
-
 from benchmarks.figures import many_lines
+from benchmarks.figures.many_lines import AT_SPEED, Found, full_speed_lines
 from benchmarks.measuring import Results
+from benchmarks.polling import Ask, Polled
 
 
 async def _nothing() -> None:
