@@ -9,7 +9,7 @@ from cyclopts import Parameter
 from rich.table import Table
 from rich.text import Text
 
-from compax_aio import CommandRejectedError, UnexpectedAnswerError
+from compax_aio import AnswerTimeoutError, CommandRejectedError, UnexpectedAnswerError
 from compax_aio.escaping import escaped
 from compax_aio.haas.answers import Answer, Busy, ProgramStatus, Request
 from compax_aio.haas.facts.queries import QUERIES
@@ -28,6 +28,11 @@ Question = Annotated[
 ]
 
 _USUAL: Final = tuple(each for each, row in QUERIES.items() if not row.takes_variable)
+_WHY_SILENT: Final = (
+    "is Setting 143 (MACHINE DATA COLLECT) on, and the control switched on? Compare Settings 11 (baud rate), 12 "
+    "(parity), 13 (stop bits) and 37 (data bits) with --profile; some controls want a question mark: --profile "
+    "data-collection-115200"
+)
 
 
 @moves_nothing
@@ -68,6 +73,9 @@ async def query(
                 said = f": {error.received!r}" if error.received is not None else ""
                 documents.append(_document(request, None, None, f"{error.what}{said}"))
                 words = Text(f"not said: {error.what}{said}", style="yellow")
+            except AnswerTimeoutError as error:
+                error.hint = _WHY_SILENT
+                raise
             else:
                 value = getattr(answer, "value", answer)
                 documents.append(_document(request, value_as_json(value), answer.text, None))

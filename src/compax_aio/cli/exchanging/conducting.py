@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 
 from compax_aio import CompaxError
 from compax_aio.haas.transfer import Transfer, TransferAccount
@@ -18,6 +18,8 @@ from .view import TransferView
 __all__ = ["Conductor"]
 
 _Result = TypeVar("_Result")
+_WORDS: Final = {"accept_damaged=True takes": "--accept-damaged takes", "with the profile": "with --profile"}
+"""What hints of the library are called here."""
 OnOperator = Callable[[str], Awaitable[None] | None]
 
 
@@ -98,7 +100,10 @@ def _what_now(account: TransferAccount) -> str:
 
 
 def _tell_people(error: CompaxError) -> None:
-    """Say nothing twice: the account of the transfer stands in most errors already."""
+    """Say what to do at a terminal, in its words, and nothing twice: the account stands in most errors already."""
+    if error.hint is not None:
+        for here, there in _WORDS.items():
+            error.hint = error.hint.replace(here, there)
     notes = getattr(error, "__notes__", [])
     archive = getattr(getattr(error, "transfer", None), "archive", None)
     notes[:] = [

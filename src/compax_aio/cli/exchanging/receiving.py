@@ -13,6 +13,7 @@ from compax_aio.haas.control import Control
 from compax_aio.haas.language.program_file import ProgramFile
 from compax_aio.haas.transfer import Received, Transfer
 
+from ...text_file import name_of
 from ..exit_codes import OK
 from ..files import Force, expect_free
 from ..interruption import moves_nothing
@@ -91,29 +92,31 @@ async def receive(
     with conductor.telling():
         async with line.open(url, profile) as control:
             received = await conductor.carry_out(what, lambda on_operator: begin(control, on_operator))
-    tell_received(received, conductor.took_s, printing)
+    _tell_received(received, out, conductor.took_s, printing)
     return OK
 
 
-def tell_received(received: Received, took_s: float, printing: Printing) -> None:
+def _tell_received(received: Received, out: Path, took_s: float, printing: Printing) -> None:
     """Say what came, what proves it, and what nothing does."""
-    contents = contents_of(received)
+    contents = _contents_of(received)
     told = {each.name: getattr(received, each.name) for each in fields(received) if each.name not in _LEFT_OUT}
     told["verified"] = None if received.verified is None else {"equal": received.verified.equal}
+    assert received.archive is not None  # one was asked for
+    file = out / received.archive.name if out.is_dir() else out
     lines = [
-        f"{received.archive}: {received.kind}, {len(received.data):,} bytes in {written_time(took_s)}: "
+        f"{name_of(file)}: {received.kind}, {len(received.data):,} bytes in {written_time(took_s)}: "
         f"{_in_words(contents)}",
         f"  proved by {received.proof}; {_of_damage(received)}",
     ]
     printing.show(
-        {"received": told, "file": str(received.archive), "bytes": len(received.data), "contents": contents},
+        {"received": told, "file": str(file), "bytes": len(received.data), "contents": contents},
         "\n".join(lines),
     )
     for warning in received.warnings:
         printing.note(f"{received.kind}: {warning}")
 
 
-def contents_of(received: Received) -> Contents:
+def _contents_of(received: Received) -> Contents:
     """Return what is in it."""
     file = received.file
     if isinstance(file, ProgramFile):
