@@ -51,7 +51,7 @@ _QUEUED: Final = 1000
 _MOVERS: Final = 8
 """So many drives move at a time, and so many have reads queued and are stopped."""
 _PAUSE_S: Final = (0.01, 0.05)
-_PERCENTILES: Final[Mapping[str, float]] = {"p50": 50, "p99": 99, "p99.9": 99.9, "longest": 100}
+_PERCENTILES: Final[Mapping[str, float]] = {"p50": 50, "p99": 99, "longest": 100}
 
 Event = tuple[int, float]
 """On which line, and when."""
@@ -339,7 +339,7 @@ def _figures(loop: str, found: Found) -> list[Figure]:
 
 def measure(effort: Effort, loops: Mapping[str, Callable[[], asyncio.AbstractEventLoop]] = LOOPS) -> Sequence[Figure]:
     """Measure on each event loop."""
-    ours = replace(effort, rounds=effort.pick(1, 2, 8), round_s=effort.pick(0.1, 1.0, 5.0))
+    ours = replace(effort, rounds=effort.pick(1, 2, 8), round_s=effort.pick(0.1, 1.0, 3.0))
     lines = effort.pick(_MOVERS, _DRIVES, _DRIVES)
     room_for(lines)
     figures = []

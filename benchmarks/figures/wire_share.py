@@ -86,7 +86,7 @@ def _urls(whole: FarEnd, by_byte: FarEnd) -> Mapping[str, Sequence[str]]:
 
 def measure(effort: Effort, loops: Mapping[str, Callable[[], asyncio.AbstractEventLoop]] = LOOPS) -> Sequence[Figure]:
     """Measure on TCP, with answers whole and byte by byte, and on a pseudo-terminal, on each event loop."""
-    ours = replace(effort, rounds=effort.pick(1, 3, 9), round_s=effort.pick(0.05, 0.6, 3.0))
+    ours = replace(effort, rounds=effort.pick(1, 3, 7), round_s=effort.pick(0.05, 0.6, 2.0))
     figures = []
     with far_end(MODULE, "2", "--ptys", "2") as whole, far_end(MODULE, "2", "--by-byte") as by_byte:
         for loop, loop_factory in loops.items():
