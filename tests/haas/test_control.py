@@ -709,6 +709,18 @@ async def test_leaving_the_block_cancels_what_is_under_way() -> None:
         assert isinstance(error, ConnectionLostError)
 
 
+async def test_a_transfer_begins_when_the_one_before_has_let_go_of_its_archive(tmp_path: Path) -> None:
+    async with bench() as b:
+        for _ in range(3):
+            transfer = b.control.receive_program(archive=tmp_path / "a.nc")
+            await asyncio.sleep(1)
+            assert transfer.account.archive == tmp_path / "a.nc.incomplete"
+            transfer.cancel()
+        received = await _received(b, archive=tmp_path / "a.nc")
+        assert received.archive == tmp_path / "a.nc"
+        assert os.listdir(tmp_path) == ["a.nc"]  # noqa: PTH208
+
+
 async def test_a_loop_that_ends_ends_the_transfer() -> None:
     async with bench() as b:
         transfer = b.control.receive_program()
@@ -906,6 +918,18 @@ async def test_what_the_control_has_stored_otherwise_is_told() -> None:
             PROGRAM, verify=True, on_operator=b.hand(("recv", "programs"), ("send", "settings"))
         )
         assert "no file of program" in (await ending(transfer)).what
+
+
+async def test_programs_are_found_among_all_that_the_control_has() -> None:
+    programs = [program_of(50, number=1), program_of(50, number=2)]
+    hands = (("recv", "programs"), ("send", "ALL"))
+    async with bench(CLASSIC_DC_CODES) as b:
+        sent = await b.control.send_programs(programs, verify=True, on_operator=b.hand(*hands))
+        assert len(b.far.memory.programs) > 2
+        assert sent.proof == "read back equal"
+        b.far.trouble.spoil_sent_byte(100)
+        error = await ending(b.control.send_programs(programs, verify=True, on_operator=b.hand(*hands)))
+        assert "not what was sent" in error.what
 
 
 async def test_settings_are_read_back_too() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from .comparing import Difference, diff
+from .comparing import Difference, How, diff
 from .language.data_file import DataFile
 from .language.program_file import ProgramFile
 from .transfer import Kind
@@ -55,10 +55,17 @@ def verified_received(first: bytes, second: bytes) -> Verified:
 
 
 def verified_sent(sent: ProgramFile | DataFile, back: ProgramFile | DataFile) -> Verified:
-    """Compare what was sent with what the control sends back; for a thread, for it may be large."""
+    """
+    Compare what was sent with what the control sends back; for a thread, for it may be large.
+
+    Programs that were never sent do not count: with ALL, a control sends back whatever it has.
+    """
     if sent.payload == back.payload:
         return Verified(equal="byte for byte", proves="the control has sent back the same bytes: it has stored them")
-    if differences := diff(sent, back):
+    differences = diff(sent, back)
+    if isinstance(sent, ProgramFile):
+        differences = tuple(each for each in differences if each.how is not How.ADDED or each.number in sent.numbers)
+    if differences:
         said = f"the control has something else stored: {'; '.join(map(str, differences[:_MOST_TOLD]))}"
         more = f" and {len(differences) - _MOST_TOLD} more" if len(differences) > _MOST_TOLD else ""
         return Verified(equal="no", differences=differences, proves=said + more)
