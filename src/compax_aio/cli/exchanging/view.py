@@ -6,7 +6,7 @@ import asyncio
 import sys
 from collections import deque
 from collections.abc import AsyncIterator, Iterator, Mapping
-from contextlib import asynccontextmanager
+from contextlib import ExitStack, asynccontextmanager
 from typing import Final
 
 from rich.console import Group, RenderableType
@@ -15,10 +15,12 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
+from compax_aio.escaping import escaped
 from compax_aio.haas.transfer import TransferPhase, TransferProgress
 
 from ..outlets import is_held_up
 from ..printing import Printing, notes_console
+from .warned import warnings_told_by
 
 __all__ = ["TransferView", "written_time"]
 
@@ -62,6 +64,7 @@ class TransferView:
         self._is_again = False
         """A second look is under way, whose time is not counted."""
         self._live: Live | None = None
+        self._warnings = ExitStack()
         self._told: tuple[str | None, TransferPhase | None] = (None, None)
         self._progress: TransferProgress | None = None
         self._got_at = 0.0
@@ -74,6 +77,7 @@ class TransferView:
             console.soft_wrap = False
             self._live = Live(console=console, auto_refresh=False, transient=True)
             self._live.start()
+            self._warnings.enter_context(warnings_told_by(self._warn))
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -84,6 +88,11 @@ class TransferView:
         live, self._live = self._live, None
         if live is not None:
             live.stop()
+            self._warnings.close()
+
+    def _warn(self, text: str) -> None:
+        if self._live is not None:
+            self._live.console.print(Text.assemble(("warning: ", "yellow"), escaped(text)))
 
     @asynccontextmanager
     async def ticking(self) -> AsyncIterator[None]:

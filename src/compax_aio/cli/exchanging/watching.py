@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 from datetime import datetime
 from typing import Annotated, Any, Final
 
@@ -26,11 +27,13 @@ from ..outlets import is_held_up
 from ..printing import Printing, results_console
 from .asking import Question, meaning_of, request_of, value_as_json, value_in_words
 from .line import ControlLine, ControlUrl, SetUp
+from .warned import warnings_told_by
 
 __all__ = ["watch"]
 
 _USUAL: Final = ("Q500", "Q104", "Q201")
 _MOST_NEWS: Final = 5
+_LOOKS: Final = {"connection_restored": "green", "printed": "cyan", "warning": "bold red"}
 _AGE_EVERY_S: Final = 1.0
 
 
@@ -106,9 +109,14 @@ async def _follow_events(control: Control, tell: Callable[[str, str], None]) -> 
         elif isinstance(event, Overheard):
             tell("overheard", event.text)
         elif isinstance(event, ConnectionLost):
-            tell("connection_lost", f"the line was lost, and is tried again: {event.reason}")
+            tell("connection_lost", _short(event.reason))
         elif isinstance(event, ConnectionRestored):
             tell("connection_restored", f"the line is back after {event.lost_for_s:.1f} s")
+
+
+def _short(reason: str) -> str:
+    """Say in one line that the line was lost; what is true of drives alone is left out."""
+    return f"the line was lost, and is tried again: {reason.partition('; ')[0]}"
 
 
 class _Display:
@@ -121,10 +129,12 @@ class _Display:
         self._reading: Reading | None = None
         self._news: list[Text] = []
         self._read_at = 0.0
+        self._warnings = ExitStack()
 
     def __enter__(self) -> _Display:
         console = results_console()
         if console.is_terminal and not self._printing.json:
+            self._warnings.enter_context(warnings_told_by(lambda text: self.tell("warning", text)))
             self._live = Live(console=console, auto_refresh=False)
             self._live.start()
             self._draw()
@@ -134,6 +144,7 @@ class _Display:
         live, self._live = self._live, None
         if live is not None:
             live.stop()
+        self._warnings.close()
 
     def show(self, reading: Reading) -> None:
         """Show a reading."""
@@ -150,8 +161,9 @@ class _Display:
                 {"event": event, "text": text}, f"{_clock()}  {event.replace('_', ' ')}: {escaped(text)}"
             )
             return
-        look = "bold red" if event == "connection_lost" else "green" if event == "connection_restored" else "cyan"
-        self._news = [*self._news, Text(f"{_clock()}  {escaped(text)}", style=look)][-_MOST_NEWS:]
+        if event == "connection_lost":
+            return  # a warning says it as well
+        self._news = [*self._news, Text(f"{_clock()}  {escaped(text)}", style=_LOOKS.get(event, ""))][-_MOST_NEWS:]
         self._draw()
 
     async def grow_old(self) -> None:
