@@ -36,15 +36,15 @@ __all__ = [
     "value_text",
 ]
 
+_HEAD: Final = re.compile(r"[SPVN][0-9]++[ \t]*+[:=]?+|[:=]")
 # Blanks may stand anywhere (UG p. 160), between a sign and its number too. Nothing else stands before it: what has lost
-# a digit on the line is another number.
-_NUMBER: Final = re.compile(r"[ \t:=]*([-+]?)[ \t]*([0-9]+(?:\.[0-9]*)?|\.[0-9]+)")
-# Behind it a unit, or nothing: "1,5", "1 234.56", "1.5E3" and "1x2.50" are numbers that would be misread. There is only
-# one way to take a text apart so: it comes from a line, and to try many could take for ever.
-_BEHIND_NUMBER: Final = re.compile(
+# a digit on the line is another number. Behind it a unit, or nothing: "1,5", "1 234.56", "1.5E3" and "1x2.50" are
+# numbers that would be misread. There is only one way to take a text apart so (nothing that is taken is given back): it
+# comes from a line, and to try many could take for ever.
+_NUMBER_ANSWER: Final = re.compile(
+    rf"[ \t]*+(?:{_HEAD.pattern})?+[ \t:=]*+([-+]?+)[ \t]*+([0-9]++(?:\.[0-9]*+)?+|\.[0-9]++)"
     r"(?![eE][-+]?\d)(?:[^\d\s.,'+-][^\d\s.,'+/]*(?:/[^\d\s.,'+]*\d?)?)?(?:\s+[^\d\s.,'+-]\S*)*\s*"
 )
-_HEAD: Final = re.compile(r"[SPVN][0-9]+[ \t]*[:=]?|[:=]")
 _BLANKS: Final = " \t"
 _ACTIVE_BIT: Final = next(bit.bit for bit in S17_BITS if bit.name == "command_active")
 _BITS: Final = re.compile(r"[01]{8}")
@@ -212,9 +212,8 @@ def decode_number(answer: str) -> float:
     Raises:
         UnexpectedAnswerError: There is none.
     """
-    text = value_text(answer)
-    found = _NUMBER.match(text)
-    if found is None or not _BEHIND_NUMBER.fullmatch(text, found.end()):
+    found = _NUMBER_ANSWER.fullmatch(answer)
+    if found is None:
         raise UnexpectedAnswerError("the answer holds no number that is understood", received=answer)
     return float(found[1] + found[2])
 
