@@ -140,10 +140,7 @@ class Interior:
     def lost(self, count: int, at: float | None = None) -> None:
         """Count bytes that nobody takes; told once in a row."""
         self.lost_bytes += count
-        log = self.around.log
-        if log and log[-1].kind is LogKind.LOST:
-            log.pop()
-        self.around.note(LogKind.LOST, str(self.lost_bytes), at)
+        self.around.note_count(LogKind.LOST, self.lost_bytes, at)
 
     # Operations
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable
-from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
+
+from ..log import DeviceLog, DeviceLogEntry
 
 __all__ = ["MAX_ENTRIES", "Log", "LogEntry", "LogKind"]
 
@@ -54,38 +53,14 @@ class LogKind(StrEnum):
     """Nobody is on the line any more."""
 
 
-@dataclass(frozen=True, slots=True)
-class LogEntry:
+class LogEntry(DeviceLogEntry[LogKind]):
     """One thing that a control did."""
 
-    at: float
-    """Time in seconds, on the clock that the control is given."""
-    kind: LogKind
-    text: str
+    __slots__ = ()
 
 
-class Log(deque[LogEntry]):
-    """
-    The last things that happened; old ones fall off at the end.
-
-    Args:
-        entries: How many are kept.
-
-    Attributes:
-        on_entry: Called with each that is added; None: nobody wants to know.
-    """
+class Log(DeviceLog[LogEntry, LogKind]):
+    """The last things that happened; old ones fall off at the end."""
 
     def __init__(self, entries: int = MAX_ENTRIES) -> None:
-        super().__init__(maxlen=entries)
-        self.on_entry: Callable[[LogEntry], None] | None = None
-
-    def add(self, at: float, kind: LogKind, text: str = "") -> None:
-        """Append an entry."""
-        entry = LogEntry(at, kind, text)
-        self.append(entry)
-        if self.on_entry is not None:
-            self.on_entry(entry)
-
-    def texts(self, *kinds: LogKind) -> list[str]:
-        """List the texts of all entries of *kinds*, oldest first."""
-        return [entry.text for entry in self if entry.kind in kinds]
+        super().__init__(LogEntry, entries)

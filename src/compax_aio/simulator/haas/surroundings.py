@@ -8,6 +8,7 @@ from typing import Final
 
 from compax_aio.haas.facts.alarms import ALARMS
 
+from ..surroundings import DeviceSurroundings
 from .knobs import Knobs
 from .log import Log, LogKind
 from .memory import Memory
@@ -32,7 +33,7 @@ class RaisedAlarm:
     at: float
 
 
-class Surroundings:
+class Surroundings(DeviceSurroundings[Knobs, LogKind]):
     """
     The inside of one control, as each part of it sees it.
 
@@ -41,8 +42,6 @@ class Surroundings:
         log: Where it notes what it does.
 
     Attributes:
-        now: The time of what happens.
-        is_on: Whether there is power.
         is_frozen: Whether only RESET, or only the main switch, helps.
         memory: Programs and numbered data.
         alarms: The ALARM display, oldest first.
@@ -50,22 +49,11 @@ class Surroundings:
     """
 
     def __init__(self, knobs: Knobs, log: Log) -> None:
-        self.knobs = knobs
-        self.log = log
-        self.now = 0.0
-        self.is_on = True
+        super().__init__(knobs, log)
         self.is_frozen = False
         self.memory = Memory(knobs)
         self.alarms: deque[RaisedAlarm] = deque(maxlen=_MOST_ALARMS)
         self.screen = ""
-
-    def reach(self, now: float) -> None:
-        """Let it be *now*, unless it is later."""
-        self.now = max(self.now, now)
-
-    def note(self, kind: LogKind, text: str = "", at: float | None = None) -> None:
-        """Keep what happened; without a time, now."""
-        self.log.add(self.now if at is None else at, kind, text)
 
     def alarm(self, name: str, detail: str = "", at: float | None = None) -> None:
         """Raise an alarm of the table."""

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
+
+from ..log import KeptEntries
 
 __all__ = ["MAX_ENTRIES", "Ending", "Log", "LogEntry", "LogKind"]
 
@@ -81,27 +81,15 @@ class LogEntry:
     """Where the axis stood when a motion began or ended, as it reads."""
 
 
-class Log(deque[LogEntry]):
-    """
-    The last things that happened, oldest first; old ones fall off at the end.
-
-    Args:
-        entries: How many are kept.
-
-    Attributes:
-        on_entry: Called with each that is added; None: nobody wants to know.
-    """
+class Log(KeptEntries[LogEntry]):
+    """The last things that happened, oldest first; old ones fall off at the end."""
 
     def __init__(self, entries: int = MAX_ENTRIES) -> None:
-        super().__init__(maxlen=entries)
-        self.on_entry: Callable[[LogEntry], None] | None = None
+        super().__init__(entries)
 
     def add(self, at: float, kind: LogKind, axis: str = "", text: str = "", position: float | None = None) -> None:
         """Append an entry."""
-        entry = LogEntry(at, kind, axis, text, position)
-        self.append(entry)
-        if self.on_entry is not None:
-            self.on_entry(entry)
+        self.keep(LogEntry(at, kind, axis, text, position))
 
     def texts(self, *kinds: LogKind, axis: str | None = None) -> list[str]:
         """List the texts of all entries of *kinds*, oldest first, of one axis or of all."""
