@@ -1,6 +1,6 @@
 # One virtual environment a purpose, each made from nothing but Python 3.11+ and make.
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint check matrix docs bench bench-full torture fuzz cutting hunt clean
+.PHONY: help demo test lint check matrix docs bench bench-full torture fuzz cutting files hunt clean
 
 # The first Python 3.11 or newer that really starts; PYTHON=... forces one.
 PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11 python; do \
@@ -51,6 +51,9 @@ fuzz:  ## every parser with bytes that nobody thought of, FUZZ_S seconds each (6
 
 cutting: $(VENV)/test.ready  ## how much of the wire a cutting job of megabytes gets, by each handshake
 	@$(BIN)/python -m benchmarks.cutting
+
+files: $(VENV)/test.ready  ## programs of two megabytes to and from a simulated control, by each synchronisation
+	@HAAS_LARGE=1 $(BIN)/python -m pytest -q --durations=8 tests/haas/test_whole_and_exact.py -k two_megabytes
 
 hunt: $(VENV)/test.ready  ## whole applications in trouble, seed after seed, for HUNT_MINUTES (30); HUNT_DEVICE=smc
 	@$(BIN)/python -m compax_aio.simulator.hunt --device $(or $(HUNT_DEVICE),compax) --minutes $(or $(HUNT_MINUTES),30)
