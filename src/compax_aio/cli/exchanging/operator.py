@@ -60,7 +60,6 @@ class Operator:
         if not self._is_asked:
             return None
         self._is_asked = False  # what is read back begins by itself
-        view.asks = "; then press Enter here"
         return self._entered(view)
 
     @staticmethod
@@ -76,6 +75,7 @@ class Operator:
 
         try:
             with keys_pressed(take, lambda: signal.raise_signal(_HUNG_UP)):
+                view.ask("; then press Enter here")  # which is heard from now on
                 await pressed
         finally:
-            view.asks = ""
+            view.ask("")

@@ -51,14 +51,13 @@ class TransferView:
         printing: How it is said.
 
     Attributes:
-        asks: What is asked here beside what has to be done at the control; empty: nothing.
         took_s: How long bytes have gone over the line, without the wait for somebody, and for the end.
     """
 
     def __init__(self, title: str, printing: Printing) -> None:
         self._title = title
         self._printing = printing
-        self.asks = ""
+        self._asks = ""
         self.took_s = 0.0
         self._first_at: float | None = None
         self._is_again = False
@@ -108,6 +107,11 @@ class TransferView:
             await asyncio.sleep(_TICK_S)
             self._draw()
 
+    def ask(self, text: str) -> None:
+        """Ask *text* here, behind what has to be done at the control; empty: nothing."""
+        self._asks = text
+        self._draw()
+
     def show(self, progress: TransferProgress) -> None:
         """Show how the transfer stands now."""
         is_news = self._progress is None or (progress.phase, progress.operator) != (
@@ -155,7 +159,7 @@ class TransferView:
     def _picture(self, progress: TransferProgress) -> Group:
         if progress.operator is not None:
             elapsed_s = progress.elapsed_s + self._now() - self._got_at
-            ask = f"{progress.operator}{self.asks}"
+            ask = f"{progress.operator}{self._asks}"
             waits = Text(f"  waiting, {written_time(elapsed_s)}; Ctrl-C gives up", style="dim")
             return Group(Text.assemble((f"{self._title}: ", ""), (ask, "bold yellow")), waits)
         grid = Table.grid(padding=(0, 1))

@@ -29,7 +29,7 @@ from .asking import Question, meaning_of, request_of, value_as_json, value_in_wo
 from .line import ControlLine, ControlUrl, SetUp
 from .warned import warnings_told_by
 
-__all__ = ["watch"]
+__all__ = ["Display", "watch"]
 
 _USUAL: Final = ("Q500", "Q104", "Q201")
 _MOST_NEWS: Final = 5
@@ -66,7 +66,7 @@ async def watch(
     requests = [request_of(each) for each in what or _USUAL]
     say_at_end("Watched no longer.")
     async with line.open(url, profile) as control:
-        display = _Display(requests, printing)
+        display = Display(requests, printing)
         with display:
             listening = asyncio.create_task(_follow_events(control, display.tell))
             ageing = asyncio.create_task(display.grow_old())
@@ -82,7 +82,7 @@ async def watch(
 async def _follow(
     control: Control,
     requests: list[Request],
-    display: _Display,
+    display: Display,
     interval: float | None,
     count: int | None,
     *,
@@ -119,7 +119,7 @@ def _short(reason: str) -> str:
     return f"the line was lost, and is tried again: {reason.partition('; ')[0]}"
 
 
-class _Display:
+class Display:
     """Shows readings and news: in place on a terminal, else one after the other."""
 
     def __init__(self, requests: list[Request], printing: Printing) -> None:
@@ -131,7 +131,7 @@ class _Display:
         self._read_at = 0.0
         self._warnings = ExitStack()
 
-    def __enter__(self) -> _Display:
+    def __enter__(self) -> Display:
         console = results_console()
         if console.is_terminal and not self._printing.json:
             self._warnings.enter_context(warnings_told_by(lambda text: self.tell("warning", text)))
