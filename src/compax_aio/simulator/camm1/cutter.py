@@ -6,7 +6,8 @@ from collections.abc import Callable
 from math import inf
 from typing import Final
 
-from ..line import Host
+from ..host_driver import HostDriver
+from ..served_device import ServedDevice
 from .cuttings import Cuttings
 from .interior import Interior
 from .knobs import Knobs
@@ -18,13 +19,9 @@ _LOOK_EVERY_S: Final = 1.0
 """A cutter at work is looked at so often, though nothing is to be told: what it has done is noted then."""
 
 
-class SimulatedCutter:
+class SimulatedCutter(ServedDevice):
     """
-    One cutter on a serial line; does no I/O.
-
-    Times are seconds on any one clock. Time goes forward in steps of any size with the same result; a time that lies
-    behind the last one counts as that. Where *now* may be left out, it is the time of whoever serves the cutter, or
-    the last time it was told.
+    One cutter on a serial line; does no I/O. Time goes by as for any :class:`.ServedDevice`.
 
     Args:
         knobs: Behaviour, mechanics and trouble.
@@ -34,20 +31,18 @@ class SimulatedCutter:
     Attributes:
         log: What it has done, oldest first.
         trouble: What is to go wrong next.
-        served_by: Who gives the cutter the time and carries its bytes; None where a test does that itself.
     """
 
     def __init__(self, knobs: Knobs | None = None, *, name: str = "cutter", log_entries: int = MAX_ENTRIES) -> None:
+        super().__init__(name)
         self.knobs = knobs or Knobs()
-        self.name = name
         self.log = Log(log_entries)
-        self.served_by: Host | None = None
         self._inside = Interior(self.knobs, self.log)
         self._around = self._inside.around
         self._machine = self._inside.machine
         self._wire = self._inside.wire
         self.trouble = self._inside.trouble
-        self._holds = False
+        self._driver = HostDriver(self._wire, self.knobs.host_queue, lost_on_close=self.knobs.lost_on_close)
 
     def __repr__(self) -> str:
         return f"<SimulatedCutter {self.name!r}: {self.knobs.model}, {self.stored_bytes} bytes stored>"
@@ -139,24 +134,13 @@ class SimulatedCutter:
     @property
     def holds_host(self) -> bool:
         """Whether what the host writes now stays with it: DTR is low and wired, or its driver is full."""
-        waiting = len(self._wire)
-        if self._wire.is_stopped or waiting > self.knobs.host_queue:
-            self._holds = True
-        elif waiting <= self.knobs.host_queue // 2:
-            self._holds = False
-        return self._holds
+        return self._driver.holds_program()
 
     def receive(self, data: bytes, now: float) -> None:
         """Take bytes that the host writes at time *now*."""
         self.advance(now)
         self._wire.write(data, self._around.now)
         self.advance(now)
-
-    def advance(self, now: float | None = None) -> None:
-        """Let everything happen that is due until *now*."""
-        if now is None:
-            now = self._around.now if self.served_by is None else self.served_by.time()
-        self._inside.reception.advance(max(now, self._around.now))
 
     def take_output(self, now: float) -> bytes:
         """Return the bytes that have come out by *now* and were not taken yet."""
@@ -166,14 +150,12 @@ class SimulatedCutter:
     def next_event_at(self) -> float | None:
         """Return when something may happen that the host is told, or when it is time to look; None: never."""
         now = self._around.now
-        at = min(self._inside.transmitter.next_at(), self._inside.reception.hears_at())
+        at = min(self._inside.transmitter.next_at(), self._inside.reception.hears_at(), self._driver.next_at())
         machine_at = self._machine.next_at()
         if machine_at < inf:
             at = min(at, machine_at if self._inside.is_watched else max(machine_at, now + _LOOK_EVERY_S))
         if len(self._wire) and not self._wire.is_stopped:
             at = min(at, max(self._wire.ends_at, now))
-            if self._holds:
-                at = min(at, self._wire.at(len(self._wire) - self.knobs.host_queue // 2 - 1))
         return at if at < inf else None
 
     def connect(self, now: float | None = None) -> None:
@@ -185,7 +167,7 @@ class SimulatedCutter:
     def disconnect(self, now: float | None = None) -> None:
         """Note that nobody is on the line; the cutter goes on with what it has."""
         self.advance(now)
-        if self.knobs.lost_on_close and (lost := self._wire.cut(self._around.now)):
+        if lost := self._driver.close(self._around.now):
             self._around.note(LogKind.TROUBLE, f"{lost} bytes lost with the port")
         self._around.note(LogKind.DISCONNECTED)
 
@@ -232,32 +214,27 @@ class SimulatedCutter:
 
     def new_sheet(self, now: float | None = None) -> None:
         """Take away what was cut."""
-        self._act(now, self.cuttings.clear)
+        self.act(now, self.cuttings.clear)
 
     # Power
 
     def power_off(self, now: float | None = None) -> None:
         """Take the power away: what is stored and set is gone, and the tool stands where it was."""
-        self._act(now, self._power_off)
+        self.act(now, self._power_off)
 
     def power_on(self, now: float | None = None) -> None:
         """Give the power back."""
-        self._act(now, self._power_on)
-
-    def power_cycle(self, now: float | None = None) -> None:
-        """Take the power away and give it back at once."""
-        self.power_off(now)
-        self.power_on(now)
+        self.act(now, self._power_on)
 
     # Trouble
 
     def slow_down(self, factor: float, now: float | None = None) -> None:
         """Let what is begun from now on take so many times as long as the knobs say."""
-        self._act(now, lambda: setattr(self._machine.blade, "factor", factor))
+        self.act(now, lambda: setattr(self._machine.blade, "factor", factor))
 
     def inject(self, data: bytes, now: float | None = None) -> None:
         """Put bytes out of nothing on the line to the host at once."""
-        self._act(now, lambda: self._inside.transmitter.inject(data))
+        self.act(now, lambda: self._inside.transmitter.inject(data))
 
     def heal(self) -> None:
         """End all trouble that was asked for and has not come yet."""
@@ -280,7 +257,7 @@ class SimulatedCutter:
                 self._around.note(LogKind.PANEL, what)
                 self._machine.held(was_still, self._around.now)
 
-        self._act(now, act)
+        self.act(now, act)
 
     def _power_off(self) -> None:
         inside, now = self._inside, self._around.now
@@ -303,9 +280,8 @@ class SimulatedCutter:
             inside.handshakes.power_on()
             inside.handshakes.look(now)
 
-    def _act(self, now: float | None, action: Callable[[], None]) -> None:
-        self.advance(now)
-        action()
-        self.advance(self._around.now)
-        if self.served_by is not None:
-            self.served_by.changed()
+    def _run(self, until: float) -> None:
+        self._inside.reception.advance(max(until, self._around.now))
+
+    def _last_told(self) -> float:
+        return self._around.now

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from compax_aio.compax.facts.line import COMMAND_END
 
-from ..line import Host
+from ..served_device import ServedDevice
 from . import replies
 from .binary import shown
 from .console import Console
@@ -40,13 +40,9 @@ class _Turn(Enum):
     """The answer is on the wire."""
 
 
-class SimulatedDrive:
+class SimulatedDrive(ServedDevice):
     """
-    One COMPAX and its axis; does no I/O.
-
-    Times are seconds on any one clock. Time goes forward in steps of any size with the same result; a time that lies
-    behind the last one counts as that. Where *now* may be left out, it is the time of whoever serves this drive, or
-    the last time it was told.
+    One COMPAX and its axis; does no I/O. Time goes by as for any :class:`.ServedDevice`.
 
     Args:
         knobs: Behaviour and mechanics.
@@ -59,13 +55,12 @@ class SimulatedDrive:
         deaf: Fault hook: nothing that arrives is received.
         lose_answers: Fault hook: so many answers or messages are still kept from the wire.
         lose_position_reached: Fault hook: so many ``$`` messages are still kept from the wire.
-        served_by: Who gives this drive the time and carries its bytes; None where a test does that itself.
         delay_position_reached_s: Fault hook: ``$`` is sent so much later than it should be.
     """
 
     def __init__(self, knobs: Knobs | None = None, *, name: str = "drive", log_entries: int = MAX_ENTRIES) -> None:
+        super().__init__(name)
         self.knobs = knobs or Knobs()
-        self.name = name
         self.log = Log(log_entries)
         self.silent = False
         self.deaf = False
@@ -74,12 +69,11 @@ class SimulatedDrive:
         self.delay_position_reached_s = 0.0
         self._extra_answer_delay_s = 0.0
         self._now = 0.0
-        self.served_by: Host | None = None
         self._machine = Machine(self.knobs, self.log, name)
         self._port = SerialPort(self.knobs)
         self._console = Console(self._machine)
         self._heed_p20()
-        self._machine.inputs.before_change = lambda: self._run(self._time(None))
+        self._machine.inputs.before_change = self.advance
         self._powered = True
         self._forget_conversation()
 
@@ -100,16 +94,12 @@ class SimulatedDrive:
 
     def receive(self, data: bytes, now: float) -> None:
         """Take bytes that the host sends at time *now*."""
-        self.advance(now)
+        self._run(now)
         if self._powered and not self.deaf:
             self._port.receive(data, self._now)
             self._after_departure()
             self._take_line()
             self._run(self._now)
-
-    def advance(self, now: float) -> None:
-        """Let everything happen that is due until *now*."""
-        self._run(now)
 
     def take_output(self, now: float) -> bytes:
         """Return the bytes that have come out by *now* and were not taken yet."""
@@ -123,13 +113,13 @@ class SimulatedDrive:
 
     def connect(self, now: float | None = None) -> None:
         """Note that somebody is on the line; what came out while nobody was there is gone."""
-        self._run(self._time(now))
+        self.advance(now)
         self._port.take()
         self.log.add(self._now, LogKind.CONNECTED)
 
     def disconnect(self, now: float | None = None) -> None:
         """Note that nobody is on the line; entry buffer, position and everything else stay as they are."""
-        self._run(self._time(now))
+        self.advance(now)
         self.log.add(self._now, LogKind.DISCONNECTED)
 
     # What tests look at
@@ -137,25 +127,25 @@ class SimulatedDrive:
     @property
     def position(self) -> float:
         """Where the axis is now."""
-        self._run(self._time(None))
+        self.advance()
         return self._machine.axis.position(self._now)
 
     @property
     def moving(self) -> bool:
         """Whether a positioning runs now."""
-        self._run(self._time(None))
+        self.advance()
         return self._machine.moving
 
     @property
     def homed(self) -> bool:
         """Whether machine zero has been found."""
-        self._run(self._time(None))
+        self.advance()
         return self._machine.homed
 
     @property
     def outputs(self) -> Mapping[int, bool]:
         """O1-O16 as they are now."""
-        self._run(self._time(None))
+        self.advance()
         return dict(self._machine.outputs)
 
     @property
@@ -188,7 +178,7 @@ class SimulatedDrive:
         That is what a real one keeps, as far as known: valid parameters, the program and the error history; by choice
         variables and the counts of S9 and S10, too. Unlike a real one it also remembers its axis. Knobs are no state.
         """
-        self._run(self._time(now))
+        self.advance(now)
         return written_state(self._machine.kept(self._now))
 
     def load_state(self, state: Mapping[str, Any], now: float | None = None) -> None:
@@ -201,7 +191,7 @@ class SimulatedDrive:
             ValueError: It is no such state, or holds something that no drive can keep; then nothing has changed.
         """
         kept = read_state(state)
-        self._run(self._time(now))
+        self.advance(now)
         self.power_off(now)
         self.power_on(now)
         self._machine.put_back(kept, self._now)
@@ -238,7 +228,7 @@ class SimulatedDrive:
 
     @extra_answer_delay_s.setter
     def extra_answer_delay_s(self, seconds: float) -> None:
-        self._run(self._time(None))
+        self.advance()
         self._extra_answer_delay_s = seconds
         self._changed()
 
@@ -246,13 +236,11 @@ class SimulatedDrive:
         """Let fault E1-E57 stop the axis, or let a warning (E58-E97) come."""
         if not 1 <= code <= _LAST_CODE:
             raise ValueError(f"a fault code is 1 to {_LAST_CODE}, not {code}")
-        self._run(self._time(now))
-        self._machine.raise_fault(code, self._now)
-        self._changed()
+        self.act(now, lambda: self._machine.raise_fault(code, self._now))
 
     def power_off(self, now: float | None = None) -> None:
         """Take the power away; until it is back nothing is received, sent or moved."""
-        self._run(self._time(now))
+        self.advance(now)
         self._powered = False
         self._port.reset()
         self._forget_conversation()
@@ -261,40 +249,27 @@ class SimulatedDrive:
 
     def power_on(self, now: float | None = None) -> None:
         """Give the power back."""
-        self._run(self._time(now))
+        self.advance(now)
         self._powered = True
         self._machine.power_on(self._now)
         if not self.silent:
             self._port.send(replies.power_on_text(self.knobs), self._now)
         self._changed()
 
-    def power_cycle(self, now: float | None = None) -> None:
-        """Take the power away and give it back at once."""
-        self.power_off(now)
-        self.power_on(now)
-
     def inject(self, data: bytes, now: float | None = None) -> None:
         """Put noise on the line to the host."""
-        self._run(self._time(now))
-        self._port.inject(data)
-        self._changed()
+        self.act(now, lambda: self._port.inject(data))
 
     # Time
 
-    def _time(self, now: float | None) -> float:
-        if now is not None:
-            return now
-        return self._now if self.served_by is None else self.served_by.time()
+    def _last_told(self) -> float:
+        return self._now
 
-    def _changed(self) -> None:
-        if self.served_by is not None:
-            self.served_by.changed()
-
-    def _run(self, now: float) -> None:
-        while (event := self._next_event()) is not None and event[0] <= now:
+    def _run(self, until: float) -> None:
+        while (event := self._next_event()) is not None and event[0] <= until:
             self._now = max(self._now, event[0])
             event[1]()
-        self._now = max(self._now, now)
+        self._now = max(self._now, until)
 
     def _next_event(self) -> tuple[float, Callable[[], None]] | None:
         """Find what happens next; of events at the same time the first of this list."""

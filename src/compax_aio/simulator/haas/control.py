@@ -7,7 +7,8 @@ from math import inf
 
 from compax_aio.haas.facts.port_settings import Synchronization
 
-from ..line import Host
+from ..host_driver import HostDriver
+from ..served_device import ServedDevice
 from .checksums import stand_in
 from .interior import Interior
 from .knobs import Knobs
@@ -21,13 +22,9 @@ from .surroundings import RaisedAlarm
 __all__ = ["SimulatedControl"]
 
 
-class SimulatedControl:
+class SimulatedControl(ServedDevice):
     """
-    One control on its data port; does no I/O.
-
-    Times are seconds on any one clock. Time goes forward in steps of any size with the same result; a time that lies
-    behind the last one counts as that. Where *now* may be left out, it is the time of whoever serves the control, or
-    the last time it was told.
+    One control on its data port; does no I/O. Time goes by as for any :class:`.ServedDevice`.
 
     Args:
         knobs: Settings, behaviour and trouble.
@@ -38,7 +35,6 @@ class SimulatedControl:
     Attributes:
         log: What it has done, oldest first.
         trouble: What is to go wrong next.
-        served_by: Who gives the control the time and carries its bytes; None where a test does that itself.
     """
 
     def __init__(
@@ -49,13 +45,12 @@ class SimulatedControl:
         log_entries: int = MAX_ENTRIES,
         checksum: Checksum = stand_in,
     ) -> None:
+        super().__init__(name)
         self.knobs = knobs or Knobs()
-        self.name = name
         self.log = Log(log_entries)
-        self.served_by: Host | None = None
         self._inside = Interior(self.knobs, self.log, checksum)
         self.trouble = self._inside.trouble
-        self._holds = False
+        self._driver = HostDriver(self._inside.wire, self.knobs.host_queue, lost_on_close=self.knobs.lost_on_close)
 
     def __repr__(self) -> str:
         return f"<SimulatedControl {self.name!r}: {self.doing}>"
@@ -137,24 +132,13 @@ class SimulatedControl:
     @property
     def holds_host(self) -> bool:
         """Whether what the host writes now stays with it: pin 4 is low, or its driver is full."""
-        waiting = len(self._inside.wire)
-        if self._inside.wire.is_stopped or waiting > self.knobs.host_queue:
-            self._holds = True
-        elif waiting <= self.knobs.host_queue // 2:
-            self._holds = False
-        return self._holds
+        return self._driver.holds_program()
 
     def receive(self, data: bytes, now: float) -> None:
         """Take bytes that the host writes at time *now*."""
         self.advance(now)
         self._inside.wire.write(data, self._inside.around.now)
         self.advance(now)
-
-    def advance(self, now: float | None = None) -> None:
-        """Let everything happen that is due until *now*."""
-        if now is None:
-            now = self._inside.around.now if self.served_by is None else self.served_by.time()
-        self._inside.advance(now)
 
     def take_output(self, now: float) -> bytes:
         """Return the bytes that have come out by *now* and were not taken yet."""
@@ -163,10 +147,7 @@ class SimulatedControl:
 
     def next_event_at(self) -> float | None:
         """Return when something may happen that the host is told; None: never."""
-        at = self._inside.next_at()
-        wire = self._inside.wire
-        if self._holds and len(wire) and not wire.is_stopped:
-            at = min(at, wire.at(len(wire) - self.knobs.host_queue // 2 - 1))
+        at = min(self._inside.next_at(), self._driver.next_at())
         return at if at < inf else None
 
     def connect(self, now: float | None = None) -> None:
@@ -180,7 +161,7 @@ class SimulatedControl:
     def disconnect(self, now: float | None = None) -> None:
         """Note that nobody is on the line; the control goes on with what it is at."""
         self.advance(now)
-        if self.knobs.lost_on_close and (lost := self._inside.wire.cut(self._inside.around.now)):
+        if lost := self._driver.close(self._inside.around.now):
             self._inside.around.note(LogKind.TROUBLE, f"{lost} bytes lost with the port")
         self._inside.around.note(LogKind.DISCONNECTED)
 
@@ -195,7 +176,7 @@ class SimulatedControl:
         def act() -> None:
             self._inside.hold_by_line(is_held, self._inside.around.now)
 
-        self._act(now, act)
+        self.act(now, act)
 
     # Keys
 
@@ -232,7 +213,7 @@ class SimulatedControl:
 
     def press_reset(self, now: float | None = None) -> None:
         """Press RESET: what it is at ends, alarms go, and a frozen control lives again."""
-        self._act(now, lambda: self._if_on(self._inside.reset))
+        self.act(now, lambda: self._if_on(self._inside.reset))
 
     def cycle_start(self, now: float | None = None, *, lasts_s: float | None = None) -> None:
         """Press CYCLE START: a cycle runs for *lasts_s*, or until :meth:`cycle_stop`."""
@@ -248,25 +229,25 @@ class SimulatedControl:
 
     def dprnt(self, text: str, now: float | None = None) -> None:
         """Let a program print a line (DPRNT); ``*`` is a space."""
-        self._act(now, lambda: self._if_on(lambda at: self._inside.collection.printed(text, at)))
+        self.act(now, lambda: self._if_on(lambda at: self._inside.collection.printed(text, at)))
 
     def popen(self, now: float | None = None) -> None:
         """Let a program open the port for what it prints (POPEN): DC2 is sent."""
-        self._act(now, lambda: self._if_on(lambda at: self._inside.punch(True, at)))
+        self.act(now, lambda: self._if_on(lambda at: self._inside.punch(True, at)))
 
     def pclos(self, now: float | None = None) -> None:
         """Let a program close it (PCLOS): DC4 is sent."""
-        self._act(now, lambda: self._if_on(lambda at: self._inside.punch(False, at)))
+        self.act(now, lambda: self._if_on(lambda at: self._inside.punch(False, at)))
 
     def overhear(self, text: str, now: float | None = None) -> None:
         """Send an answer to another host, as newer controls do over Ethernet."""
-        self._act(now, lambda: self._if_on(lambda at: self._inside.collection.overheard(text, at)))
+        self.act(now, lambda: self._if_on(lambda at: self._inside.collection.overheard(text, at)))
 
     # Power and trouble
 
     def power_off(self, now: float | None = None) -> None:
         """Take the power away: what is under way is lost; memory stays."""
-        self._act(now, lambda: self._if_on(self._inside.switch_off))
+        self.act(now, lambda: self._if_on(self._inside.switch_off))
 
     def power_on(self, now: float | None = None) -> None:
         """Give the power back."""
@@ -275,20 +256,15 @@ class SimulatedControl:
             if not self._inside.around.is_on:
                 self._inside.switch_on(self._inside.around.now)
 
-        self._act(now, act)
-
-    def power_cycle(self, now: float | None = None) -> None:
-        """Take the power away and give it back at once."""
-        self.power_off(now)
-        self.power_on(now)
+        self.act(now, act)
 
     def freeze(self, now: float | None = None) -> None:
         """Let it freeze, as a control did that was polled without pause: nothing is answered until RESET is pressed."""
-        self._act(now, lambda: self._if_on(self._inside.freeze))
+        self.act(now, lambda: self._if_on(self._inside.freeze))
 
     def inject(self, data: bytes, now: float | None = None) -> None:
         """Put bytes out of nothing on the line to the host, behind what is being sent."""
-        self._act(now, lambda: self._inside.transmitter.send(data, self._inside.around.now))
+        self.act(now, lambda: self._inside.transmitter.send(data, self._inside.around.now))
 
     def heal(self) -> None:
         """End all trouble that was asked for and has not come yet."""
@@ -307,13 +283,10 @@ class SimulatedControl:
             if not self._inside.around.is_frozen:
                 self._if_on(press)
 
-        self._act(now, act)
+        self.act(now, act)
 
-    def _act(self, now: float | None, action: Callable[[], None]) -> None:
-        self.advance(now)
-        try:
-            action()
-            self.advance(self._inside.around.now)
-        finally:
-            if self.served_by is not None:
-                self.served_by.changed()
+    def _run(self, until: float) -> None:
+        self._inside.advance(until)
+
+    def _last_told(self) -> float:
+        return self._inside.around.now

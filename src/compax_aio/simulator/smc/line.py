@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from random import Random
 from types import MappingProxyType
 from typing import Any, Final
 
 from compax_aio.smc.facts import Mode
 
-from ..line import Host
+from ..served_device import ServedDevice
 from ..state_file import load_state_file
 from .agenda import Agenda
 from .axis import SimulatedAxis
@@ -30,13 +30,9 @@ _MAX_WAITING: Final = 65_536
 """Bytes kept in any one direction; more are lost, so that memory is bounded."""
 
 
-class SimulatedPartyLine:
+class SimulatedPartyLine(ServedDevice):
     """
-    One serial line with one or several controllers; does no I/O.
-
-    Times are seconds on any one clock. Time goes forward in steps of any size with the same result; a time that lies
-    behind the last one counts as that. Where *now* may be left out, it is the time of whoever serves this line, or the
-    last time it was told.
+    One serial line with one or several controllers; does no I/O. Time goes by as for any :class:`.ServedDevice`.
 
     In a ring, who sends of its own leaves its neighbour time to read: how real ones do that is not known.
 
@@ -49,7 +45,6 @@ class SimulatedPartyLine:
     Attributes:
         axes: The axes, by the letters of the knob.
         log: What line and axes have done, oldest first.
-        served_by: Who gives this line the time and carries its bytes; None where a test does that itself.
     """
 
     def __init__(
@@ -60,10 +55,9 @@ class SimulatedPartyLine:
         axis_knobs: Mapping[str, Knobs] | None = None,
         log_entries: int = MAX_ENTRIES,
     ) -> None:
+        super().__init__(name)
         self.knobs = knobs or Knobs()
-        self.name = name
         self.log = Log(log_entries)
-        self.served_by: Host | None = None
         self._agenda = Agenda()
         self._chance = Random(self.knobs.seed)
         self._trouble = Trouble(self._agenda, self.knobs, self.log, self._chance)
@@ -110,12 +104,6 @@ class SimulatedPartyLine:
             self._arriving.append((self._input_free_at, byte))
         self._await_arrival()
 
-    def advance(self, now: float | None = None) -> None:
-        """Let everything happen that is due until *now*."""
-        if now is None:
-            now = self._agenda.now if self.served_by is None else self.served_by.time()
-        self._agenda.run(now)
-
     def take_output(self, now: float) -> bytes:
         """Return the bytes that have come out by *now* and were not taken yet."""
         self.advance(now)
@@ -147,11 +135,6 @@ class SimulatedPartyLine:
     def power_on(self, now: float | None = None) -> None:
         """Give the power back."""
         self.act(now, self._power_on)
-
-    def power_cycle(self, now: float | None = None) -> None:
-        """Take the power away and give it back at once."""
-        self.power_off(now)
-        self.power_on(now)
 
     def save_state(self, now: float | None = None) -> dict[str, Any]:
         """
@@ -239,14 +222,13 @@ class SimulatedPartyLine:
         """End all trouble that was asked for and has not come yet, and let the line speak."""
         self._trouble.end()
 
-    def act(self, now: float | None, action: Callable[[], None]) -> None:
-        """Do something at time *now*, and tell who serves this line."""
-        self.advance(now)
-        action()
-        if self.served_by is not None:
-            self.served_by.changed()
-
     # How it works
+
+    def _run(self, until: float) -> None:
+        self._agenda.run(until)
+
+    def _last_told(self) -> float:
+        return self._agenda.now
 
     def _wired(self) -> list[Controller]:
         """Connect the controllers; return those that hear the host."""
