@@ -229,13 +229,46 @@ def test_over_ethernet_answers_have_another_frame() -> None:
     assert told(protocol) == [Answered("MACRO, 0.0")]
 
 
-def test_what_the_bytes_before_it_take_is_added_to_the_time_of_an_answer() -> None:
+def test_a_late_echo_is_none_of_what_programs_print() -> None:
+    protocol = owing("Q100")
+    protocol.send("Q101")
+    protocol.time_ran_out()
+    protocol.receive(b"Q100\r\n" + framed("S/N, 1") + b"Q101\r\n" + framed("SOFTWARE, 2"))
+    assert told(protocol) == [LateEnding("Q100", Answered("S/N, 1")), Answered("SOFTWARE, 2")]
+
+
+def test_what_a_line_owes_that_was_lost_the_next_one_may_bring() -> None:
+    protocol = asking("Q600 500")
+    protocol.line_lost()
+    protocol.line_opened()
+    back_in_step(protocol)
+    protocol.send("Q600 501")
+    protocol.time_ran_out()
+    assert protocol.bytes_to_send() == b"Q100\r\n"
+    protocol.receive(framed("MACRO, 7.0"))
+    protocol.events()
+    assert protocol.state is State.CATCHING_UP
+
+
+@pytest.mark.parametrize(
+    ("characters_per_s", "quiet_s"), [(960.0, SETTINGS.gap_s), (30.0, 16 / 30), (None, SETTINGS.gap_s)]
+)
+def test_on_a_slow_line_a_pause_is_longer_than_what_a_uart_holds_back(
+    characters_per_s: float | None, quiet_s: float
+) -> None:
+    protocol = in_step()
+    protocol.level = LineLevel(characters_per_s)
+    protocol.send("Q100")
+    assert protocol.patience_s == pytest.approx(quiet_s)
+
+
+def test_what_the_bytes_before_it_take_and_its_own_is_added_to_the_time_of_an_answer() -> None:
     protocol = in_step()
     protocol.level = LineLevel(1000.0, lambda: 500)
     protocol.send("Q100")
     protocol.time_ran_out()
     patience_s = protocol.patience_s
-    assert patience_s == pytest.approx(SETTINGS.answer_timeout_s + 0.506)
+    assert patience_s == pytest.approx(SETTINGS.answer_timeout_s + 0.506 + 0.064)
 
 
 def test_an_echo_is_no_print() -> None:

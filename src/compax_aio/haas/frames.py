@@ -8,6 +8,7 @@ as broken. Nothing is found by its place, only by its signs.
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 from enum import Enum
 from typing import Final, Literal
@@ -35,6 +36,7 @@ Form = Literal["rs-232", "ethernet"]
 _LONGEST_FRAME: Final = 256
 """Answers have a dozen to fifty characters."""
 _LONGEST_LINE: Final = 512
+_MOST_ECHOES: Final = 8
 _TAIL: Final = bytes([CARRIAGE_RETURN, LINE_FEED, PROMPT])
 _LINE_ENDS: Final = bytes([CARRIAGE_RETURN, LINE_FEED])
 _LEFT_OVER: Final = (bytes([PROMPT]), WRITE_DONE.encode())
@@ -277,16 +279,24 @@ class PrintReader:
         self._held = bytearray()
         self._is_damaged = False
         self._after_return = False
-        self._request: bytes | None = None
+        self._requests: deque[bytes] = deque(maxlen=_MOST_ECHOES)
 
     @property
     def has_begun_line(self) -> bool:
         """Whether a part of a line has come."""
         return bool(self._held)
 
-    def expect_echo(self, request: str) -> None:
-        """Take the next line that says no other than *request* for its echo; until the next call, and once."""
-        self._request = request.strip().encode("latin-1")
+    def expect_echo(self, request: str, *, earlier_may_come: bool = False) -> None:
+        """
+        Take the next line that says no other than *request* for its echo; once.
+
+        Args:
+            request: What is asked.
+            earlier_may_come: What was asked before is unanswered: its echo may come late as well.
+        """
+        if not earlier_may_come:
+            self._requests.clear()
+        self._requests.append(request.strip().encode("latin-1"))
 
     def feed(self, data: bytes, *, is_damaged: bool = False) -> list[Line | Echo]:
         """Return the lines that *data* completes."""
@@ -319,13 +329,17 @@ class PrintReader:
 
     @property
     def _is_echo(self) -> bool:
-        return self._request is not None and self._held.strip().lstrip(bytes([PROMPT])).strip() == self._request
+        return bool(self._requests) and self._echoed in self._requests
+
+    @property
+    def _echoed(self) -> bytes:
+        return bytes(self._held.strip().lstrip(bytes([PROMPT])).strip())
 
     def _finish(self, *, is_whole: bool = True) -> Line | Echo:
-        text, is_damaged, is_echo = self._held.decode("latin-1"), self._is_damaged, self._is_echo
+        text, is_damaged, is_echo, echoed = self._held.decode("latin-1"), self._is_damaged, self._is_echo, self._echoed
         self._held.clear()
         self._is_damaged = False
         if is_echo and not is_damaged:
-            self._request = None
+            self._requests.remove(echoed)
             return Echo(text.strip())
         return Line(text, is_damaged, is_whole)

@@ -46,6 +46,10 @@ _MOST_WHILE_QUIETING_BYTES: Final = 4096
 """So much comes in four seconds at 9600 baud: whatever it is, it does not end soon."""
 _MOST_PUT_OFFS: Final = 256
 """And so often such a pause begins anew."""
+_SILENT_CHARACTERS: Final = 16
+"""A pause is none in which not even so many could have come: a UART may hand over as many at once, and no sooner."""
+_ANSWER_BYTES: Final = 64
+"""Answers have a dozen to fifty characters, and what was asked may come back in front of one."""
 
 
 class HaasProtocol:
@@ -101,16 +105,23 @@ class HaasProtocol:
         if self.state is State.TRANSFERRING:
             return self._transfer.pause_s
         if self.state is State.QUIETING:
-            return settings.quiet_s
+            return self._silent_s(settings.quiet_s)
         if self.state is State.CALMING:
             return settings.silence_timeout_s if self._signs.is_held else self._calm_s
-        return settings.answer_timeout_s + self.level.leaves_s(self._unwritten_bytes)
+        return settings.answer_timeout_s + self.level.leaves_s(self._unwritten_bytes) + self._takes_s(_ANSWER_BYTES)
 
     @property
     def _calm_s(self) -> float:
         """How long the line is silent before something is sent."""
         is_file_in_doubt = self._strategy is not None and self._questions.owes
-        return self._settings.quiet_s if is_file_in_doubt else self._settings.gap_s
+        return self._silent_s(self._settings.quiet_s if is_file_in_doubt else self._settings.gap_s)
+
+    def _silent_s(self, at_least_s: float) -> float:
+        return max(at_least_s, self._takes_s(_SILENT_CHARACTERS))
+
+    def _takes_s(self, count: int) -> float:
+        """How long so many bytes are on the wire; 0 where nobody knows how fast it is."""
+        return count / self.level.bytes_per_s if self.level.bytes_per_s else 0.0
 
     @property
     def held(self) -> Hold | None:
@@ -323,7 +334,7 @@ class HaasProtocol:
     def _ask(self) -> None:
         text = self._profile.request_prefix + self._questions.next_text()
         self._step(Step.PROBE_SENT if self._questions.is_probing else Step.QUERY_SENT)
-        self._prints.expect_echo(text)
+        self._prints.expect_echo(text, earlier_may_come=self._questions.owes)
         self._write((text + self._profile.request_end).encode("ascii"))
 
     def _hold_back(self, *, by_xoff: bool) -> None:

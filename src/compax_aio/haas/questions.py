@@ -103,6 +103,5 @@ class Questions:
         self._is_sent = False
 
     def line_is_new(self) -> None:
-        """Take note that nothing will be answered that was asked until now."""
-        self._owed.clear()
-        self.drop()
+        """Take note of another line, over which an answer may still come: behind a server it is the same control."""
+        self.give_up()
