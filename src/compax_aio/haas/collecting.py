@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections import deque
 from collections.abc import Callable
 from math import inf
 from typing import Any, Final
@@ -18,6 +19,9 @@ __all__ = ["Collecting", "value_of"]
 _SHARED_FOR_S: Final = 60.0
 """So long after an answer to somebody else's question another one is reckoned with."""
 _MOST_CONFIRMATIONS: Final = 5
+_SETTLES_S: Final = 0.5
+"""So long an answer may take that is still on its way, as long as none was timed (a gateway reckons with that)."""
+_TIMED: Final = 8
 
 
 class Collecting:
@@ -43,6 +47,10 @@ class Collecting:
         self._under_way: set[asyncio.Task[str]] = set()
         self._overheard = 0
         self._overheard_at = -inf
+        self._took_s: deque[float] = deque(maxlen=_TIMED)
+        """How long the last answers took."""
+        self._heard_on = self._repeated_on = 0
+        """How often the line had been opened when the last answer came, and when a question was asked again."""
 
     # Asking ---------------------------------------------------------------------------------------------------------
 
@@ -79,6 +87,28 @@ class Collecting:
         Raises:
             As :meth:`ask`.
         """
+        try:
+            return await asyncio.shield(await self.begin(request, lane))
+        except AnswerTimeoutError as error:
+            if error.sent is None or lane is not Lane.READ or not self._may_be_lost:
+                raise
+        self._repeated_on = self.line.link.times_opened
+        return await asyncio.shield(await self.begin(request, lane))
+
+    @property
+    def _may_be_lost(self) -> bool:
+        """Whether a control may not have taken the first question of a connection, as newer ones do."""
+        opened = self.line.link.times_opened
+        return self._is_shared and opened not in {self._heard_on, self._repeated_on}
+
+    async def begin(self, request: Request, lane: Lane) -> asyncio.Task[str]:
+        """
+        Wait for the turn of *request*, and send it then: from there on it is carried through.
+
+        Raises:
+            InvalidCommandError: This control collects no data.
+            AnswerTimeoutError: It cannot be sent for longer than it may wait.
+        """
         if self.line.profile.data_collection is None:
             raise InvalidCommandError(
                 f"{request.text!r} cannot be asked: the profile {self.line.profile.name!r} says that this control "
@@ -89,10 +119,11 @@ class Collecting:
         await self.pacing.enter(request.text)
         task = self._loop.create_task(self._exchange(request.text, lane), name=f"{self.line.name}: {request.text}")
         self._under_way.add(task)
-        task.add_done_callback(self._forget)
-        return await asyncio.shield(task)
+        task.add_done_callback(self._is_over)
+        return task
 
     async def _exchange(self, text: str, lane: Lane) -> str:
+        began_at = self._loop.time()
         try:
             answer = await self.line.ask(text, lane)
         except AnswerTimeoutError:
@@ -103,11 +134,12 @@ class Collecting:
             raise
         else:
             self.pacing.note_answered()
+            self._heard_on = self.line.link.times_opened
+            self._took_s.append(self._loop.time() - began_at)
             return answer
-        finally:
-            self.pacing.leave()
 
-    def _forget(self, task: asyncio.Task[str]) -> None:
+    def _is_over(self, task: asyncio.Task[str]) -> None:
+        self.pacing.leave()  # here, for a task that is cancelled before it begins comes to no line of its own
         self._under_way.discard(task)
         if not task.cancelled():
             task.exception()  # a caller that was cancelled does not fetch it
@@ -128,9 +160,16 @@ class Collecting:
         """Whether other hosts' answers may come over this line."""
         return self.line.profile.data_collection == "ethernet"
 
+    @property
+    def _settle_s(self) -> float:
+        """How long our own answer may still take when one has come that may be another host's."""
+        settings = self.line.settings
+        longest = 2 * max(self._took_s) if len(self._took_s) > 1 else _SETTLES_S
+        return max(min(longest, settings.answer_timeout_s), 2 * settings.gap_s)
+
     async def _confirmed(self, request: Request, text: str, overheard: int) -> str:
         """Return an answer that is no other host's; *text* is the first one, *overheard* was counted before it."""
-        settle_s = 2 * self.line.settings.gap_s
+        settle_s = self._settle_s
         await asyncio.sleep(settle_s)  # if it was another host's, our own follows
         if self._overheard == overheard and self._loop.time() - self._overheard_at > _SHARED_FOR_S:
             return text

@@ -8,7 +8,7 @@ for or cancel brings questions closer to each other than the line's own gap.
 from __future__ import annotations
 
 import asyncio
-from collections import deque
+from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
@@ -54,7 +54,8 @@ class Pacing:
         self._settings = settings
         self._transfer = transfer
         self._loop = asyncio.get_running_loop()
-        self._waiting: deque[object] = deque()
+        self._waiting: OrderedDict[asyncio.Future[None], None] = OrderedDict()
+        """First come, first served; each is done when it is the first one."""
         self._is_taken = False
         self._wakers: set[asyncio.Future[None]] = set()
         self._in_vain = 0
@@ -73,10 +74,15 @@ class Pacing:
         Raises:
             AnswerTimeoutError: *question* cannot be sent for longer than it may wait; it was not.
         """
-        ticket, arrived_at = object(), self._loop.time()
-        self._waiting.append(ticket)
+        is_first: asyncio.Future[None] = self._loop.create_future()
+        arrived_at = self._loop.time()
+        self._waiting[is_first] = None
+        self._call_first()
         try:
-            while (block := self._block()) is not None or self._is_taken or self._waiting[0] is not ticket:
+            # Whoever came later gives up later: it is enough that the first one looks whether it may go, for waking
+            # all who wait each time that one of them goes takes a time of its own when there are thousands.
+            await is_first
+            while (block := self._block()) is not None or self._is_taken:
                 until = inf
                 if block is not None:
                     give_up_at = max(arrived_at, block.since) + block.patience_s
@@ -86,8 +92,8 @@ class Pacing:
                 await self._change(until, block)
             self._is_taken = True
         finally:
-            self._waiting.remove(ticket)
-            self._wake()
+            del self._waiting[is_first]
+            self._call_first()
 
     def leave(self) -> None:
         """Let the next question through."""
@@ -161,6 +167,11 @@ class Pacing:
         finally:
             self._wakers.discard(waker)
             waker.cancel()
+
+    def _call_first(self) -> None:
+        first = next(iter(self._waiting), None)
+        if first is not None and not first.done():
+            first.set_result(None)
 
     def _wake(self) -> None:
         for waker in self._wakers:

@@ -60,20 +60,28 @@ class VariableWriter:
         """Write a variable, and return what it reads afterwards; see :meth:`Control.write_variable`."""
         number = self._checked_number(number)
         text = self._checked_value(number, value)
-        async with self._turn:
+        await self._turn.acquire()
+        try:
             before = await self._read(number)
-            # From here on it is carried through although the caller is cancelled: what became of it goes on record.
-            task = self._loop.create_task(self._write(number, text, before), name=f"{self._line.name}: write #{number}")
-            self._tasks.add(task)
-            task.add_done_callback(self._forget)
-            try:
-                return await asyncio.shield(task)
-            finally:
-                if not task.done():  # cancelled: the next write has its turn when this one is over
-                    with suppress(CompaxError):
-                        await asyncio.shield(task)
+            answer = await self._send(Request.writing(number, text), before)
+        except BaseException:
+            self._turn.release()
+            raise
+        # From here on it is carried through although the caller is cancelled: what became of it goes on record.
+        task = self._loop.create_task(
+            self._follow(Request.writing(number, text), before, answer), name=f"{self._line.name}: write #{number}"
+        )
+        self._tasks.add(task)
+        task.add_done_callback(self._is_over)
+        try:
+            return await asyncio.shield(task)
+        finally:
+            if not task.done():  # cancelled
+                with suppress(CompaxError):
+                    await asyncio.shield(task)
 
-    def _forget(self, task: asyncio.Task[float]) -> None:
+    def _is_over(self, task: asyncio.Task[float]) -> None:
+        self._turn.release()  # here, so that the next write waits for it however often the caller is cancelled
         self._tasks.discard(task)
         if not task.cancelled():
             task.exception()  # a caller that was cancelled does not fetch it
@@ -127,18 +135,32 @@ class VariableWriter:
         assert isinstance(answer, VariableValue)
         return None if value is None else float(value)
 
-    async def _write(self, number: int, text: str, before: float | None) -> float:
-        request = Request.writing(number, text)
+    async def _send(self, request: Request, before: float | None) -> asyncio.Task[str]:
+        """Send it in its turn; whoever gives up until then has written nothing."""
+        number, text = request.variable, request.value
         self._record(logging.INFO, "#%d = %s is written; it was %s", number, text, _shown(before))
+        try:
+            return await self._collecting.begin(request, Lane.CONTROL)
+        except asyncio.CancelledError:
+            self._record(logging.WARNING, "#%d = %s was not sent: the caller has given up", number, text)
+            raise
+        except CompaxError as error:
+            self._record(logging.WARNING, "#%d = %s was not sent: %s", number, text, error)
+            raise
+
+    async def _follow(self, request: Request, before: float | None, answer: asyncio.Task[str]) -> float:
+        """Await the answer, if there is one, and find out what became of it."""
+        assert request.variable is not None  # it writes one
+        assert request.value is not None
         failure: CompaxError | None = None
         try:
-            self._collecting.decode(request, await self._collecting.exchange(request, Lane.CONTROL))
+            self._collecting.decode(request, await asyncio.shield(answer))
         except CompaxError as error:
             if error.sent is None:
-                self._record(logging.WARNING, "#%d = %s was not sent: %s", number, text, error)
+                self._record(logging.WARNING, "#%d = %s was not sent: %s", request.variable, request.value, error)
                 raise
             failure = error
-        return await self._judge(request, number, float(text), before, failure)
+        return await self._judge(request, request.variable, float(request.value), before, failure)
 
     async def _judge(
         self, request: Request, number: int, wanted: float, before: float | None, failure: CompaxError | None
@@ -149,13 +171,17 @@ class VariableWriter:
         except CompaxError as error:
             self._record(logging.ERROR, "#%d = %s is in doubt: it cannot be read back: %s", number, wanted, error)
             raise self._in_doubt(request, number, wanted, failure, error) from error
-        if found is not None and written(found, self._decimals) == written(wanted, self._decimals):
+        is_refused = isinstance(failure, CommandRejectedError) and self._is(before, wanted)
+        if found is not None and self._is(found, wanted) and not is_refused:
             how = "" if failure is None else f" (the control's answer was none: {failure.what})"
             self._record(logging.INFO, "#%d = %s reads back so%s", number, _shown(found), how)
             self._publish(VariableWritten(self._line.name, self._loop.time(), number, before, found))
             return found
         self._record(logging.WARNING, "#%d = %s was not taken: it reads %s", number, wanted, _shown(found))
         raise self._not_taken(request, number, wanted, found, failure)
+
+    def _is(self, value: float | None, wanted: float) -> bool:
+        return value is not None and written(value, self._decimals) == written(wanted, self._decimals)
 
     def _in_doubt(
         self, request: Request, number: int, wanted: float, failure: CompaxError | None, error: CompaxError
@@ -174,7 +200,8 @@ class VariableWriter:
     def _not_taken(
         self, request: Request, number: int, wanted: float, found: float | None, failure: CompaxError | None
     ) -> CompaxError:
-        what = f"variable #{number} was not written: it reads {_shown(found)}, not {wanted:g}"
+        reads = f"{_shown(found)}, as before" if self._is(found, wanted) else f"{_shown(found)}, not {wanted:g}"
+        what = f"variable #{number} was not written: it reads {reads}"
         if isinstance(failure, CommandRejectedError):
             hint = "the control does not know this request, or does not let this variable be written"
             return CommandRejectedError(

@@ -11,7 +11,7 @@ from functools import partial
 from itertools import count
 from types import MappingProxyType, TracebackType
 from typing import Any, Final, Self
-from weakref import WeakValueDictionary
+from weakref import WeakSet, WeakValueDictionary
 
 from ..checked_numbers import check_number
 from ..errors import AnswerTimeoutError, CompaxError, ConnectionLostError, InvalidCommandError
@@ -272,8 +272,10 @@ class Watching:
                     await self._wait_until(due_at)
                 else:
                     await self._cycle()
-        except ConnectionLostError:
-            pass  # the line is over: the control tells all who watch, or has done so
+        except CompaxError:
+            # The line is over, whatever the last question failed by: the control tells all who watch, or has done so.
+            if not self._collecting.line.link.is_over:
+                raise
         except BaseException as error:
             # A defect, or somebody who cancels every task there is: nobody shall wait for ever.
             if self._task is asyncio.current_task():
@@ -295,17 +297,20 @@ class Watching:
         """Ask for all who are due, once each, and give them their readings."""
         now = self._loop.time()
         self._next_cycle_at = now + self._cycle_s
+        due, requests = self._take_due(now)
+        values, errors = await self._answers(requests)
+        for watch in list(due):
+            if not watch.has_ended:
+                watch.put(self._reading(watch, now, values, errors))
+
+    def _take_due(self, now: float) -> tuple[WeakSet[Watch], dict[Quantity, Request]]:
+        """Return whose readings are due, without holding them, and what is to be asked for them."""
         due = [watch for watch in self._watched if watch.due_at <= now + _SAME_TIME_S]
         requests: dict[Quantity, Request] = {}
         for watch in due:
             watch.due_at = now + watch.interval_s
             requests.update(watch.requests)
-        wanted = [{*watch.requests} for watch in due]
-        del due, watch  # a watch that nobody holds any more is not to be held here
-        values, errors = await self._answers(requests)
-        for waiting in self._watched:
-            if waiting.due_at == now + waiting.interval_s and {*waiting.requests} in wanted:
-                waiting.put(self._reading(waiting, now, values, errors))
+        return WeakSet(due), requests
 
     async def _answers(
         self, requests: Mapping[Quantity, Request]
