@@ -36,6 +36,7 @@ pytestmark = [pytest.mark.real_time, pytest.mark.filterwarnings("ignore:.*multi-
 
 DRIVES = 6
 LINES = 6
+CONTROLS = 3
 """So many are served, for cells at the same time."""
 
 IN_DOUBT = 8
@@ -147,6 +148,8 @@ def carry_out(cell: Cell, far: FarEnd, folder: Path, number: int) -> Outcome:
     if far.seen("befell")[-1:] == ["unplug"]:
         far.does("plug", "plugged in")
     far.heals()
+    if cell.device == "control":
+        far.does("reset", "reset")  # what it was at is over
     return outcome
 
 
@@ -270,6 +273,7 @@ def cells() -> Iterator[Cell]:
     yield from sitting()
     yield from at_the_monitor()
     yield from on_a_party_line()
+    yield from at_a_control()
     yield from without_a_line()
 
 
@@ -307,6 +311,53 @@ def on_a_party_line() -> Iterator[Cell]:
     yield watch("Ctrl-C", does=CTRL_C, code=130, says=(r"[0-9]+ steps",))
 
 
+def at_a_control() -> Iterator[Cell]:
+    """Make the rows of commands for Haas controls, at which somebody presses keys."""
+    receive, send = ("haas receive", "program -o {dir}/received-{n}.nc"), ("haas send", "{dir}/long.nc")
+    feed = ("haas send", "{dir}/long.nc --dnc --yes")
+    query, watch = ("haas query", "Q100 Q104 Q500 3027"), ("haas watch", "Q500")
+    soon, settings = "--operator-timeout 1", (r"Settings 11 \(baud rate\)",)
+    by_codes = f"{soon} --profile classic-dc-codes"
+    transfers: Mapping[str, tuple[Words, str]] = {
+        "haas receive": (receive, soon),
+        "haas send": (send, by_codes),
+        "haas send --dnc": (feed, by_codes),
+    }
+    rate = "?baudrate=4800"
+    asking = (query, "--answer-timeout 0.3")
+    for name, (words, options) in {**transfers, "haas query": asking}.items():
+        cell = partial(Cell, name, words, options, device="control", leaves="at rest")
+        yield cell("wrong port", url="nowhere", code=3, says=NO_PORT)
+        yield cell("wrong baud rate", url=rate, code=4, says=settings)
+        yield cell("silent control", before="silent", code=4, says=settings)
+    cell = partial(Cell, "haas query", query, "", device="control", before="late 200ms", when=f"{AT_FAR_END}request")
+    yield cell("unplugged", does=UNPLUG, code=3, says=LOST[:2], leaves="at rest")
+    yield cell("Ctrl-C", does=CTRL_C, code=130, says=INTERRUPTED, leaves="at rest")
+    yield from in_the_middle_of_a_file(receive, send, feed)
+    cell = partial(Cell, "haas watch", watch, "", device="control", when="IDLE", leaves="at rest")
+    yield cell("silent", does=SILENT, then=(("no answer", CTRL_C),), code=130, says=(r"Watched no longer",))
+    yield cell("unplugged", does=UNPLUG, then=(("was lost", CTRL_C),), code=130, says=(r"Watched no longer",))
+    yield cell("Ctrl-C", does=CTRL_C, code=130, says=(r"Watched no longer",))
+
+
+def in_the_middle_of_a_file(receive: Words, send: Words, feed: Words) -> Iterator[Cell]:
+    """Make the rows in which a key is pressed first: RECV or SEND at the far end, Enter at the terminal."""
+    presses = {"haas receive": (receive, "SEND", f"{AT_FAR_END}send O00010", ""),
+               "haas send": (send, "Enter", f"{AT_FAR_END}recv", "\r"),
+               "haas send --dnc": (feed, "Enter", f"{AT_FAR_END}dnc", "\r")}  # fmt: skip
+    for name, (words, asked, key, enter) in presses.items():
+        begin = ((asked, key), ("", enter), ("bytes/s", ""))
+        cell = partial(Cell, name, words, "--silence-timeout 1", device="control", leaves="")
+        far = r"bytes (came|have left)"
+        yield cell("unplugged in the middle", then=(*begin, IS_UNPLUGGED), code=3, says=(LOST[0], far, "never resumed"))
+        yield cell("Ctrl-C in the middle", then=(*begin, ("", CTRL_C)), code=130, says=(r"was given up", far))
+        nobody = partial(cell, when=asked, does=CTRL_C, code=130)
+        yield nobody("Ctrl-C before a key is pressed", says=("nothing of the file (was sent|came)",))
+    cell = partial(Cell, "haas receive", receive, "--silence-timeout 1", device="control", leaves="")
+    begin = (("SEND", f"{AT_FAR_END}send O00010"), ("bytes/s", f"{AT_FAR_END}reset"))
+    yield cell("RESET in the middle", then=begin, code=4, says=("fallen silent", "was RESET pressed", r"\.incomplete"))
+
+
 def without_a_line() -> Iterator[Cell]:
     """Make the rows of commands that work on files."""
     files = {
@@ -316,6 +367,7 @@ def without_a_line() -> Iterator[Cell]:
         "trace info": (2, r"garbage\.csv", r"Is a directory"),
         "program check": (1, r"garbage\.csv:1:1: error: .* begin the line like N001:", r"Is a directory"),
         "program print": (2, r"line 1, column 1: error: .* begin the line like N001:", r"Is a directory"),
+        "haas check": (1, r"garbage\.csv:1:1: error: it does not begin with %", r"Is a directory"),
         "smc program check": (2, r"line 1, column 1: 'a' is not known", r"Is a directory"),
     }
     for name, (code, garbage, folder) in files.items():
@@ -385,6 +437,7 @@ FILES: Final[Mapping[str, str]] = {
     "program.txt": "N001: POSA 9000\nN002: POSA 0\nN003: END\n",
     "garbage.csv": "a,b\n1,\x00\n",
     "axis.txt": "R900000\nR0\n",
+    "long.nc": "%\nO00077\n" + "G1 X1.5 Y2.5\n" * 3000 + "M30\n%\n",
 }
 
 
@@ -416,7 +469,14 @@ def carried_out(wanted: Iterable[Cell], folder: Path) -> Iterator[dict[Cell, Fut
     axes = Served(
         "smc", *kept_lines(folder), "axes=XY", "home=-900000", "baudrate=9600", environment=_environment(folder)
     )
-    for kind, served in (("drive", drives), ("axes", axes)):
+    controls = Served(
+        "haas",
+        *("--count", str(CONTROLS), "--link", str(folder / "control")),
+        "baudrate=9600",
+        "program_blocks=5000",
+        environment=_environment(folder),
+    )
+    for kind, served in (("drive", drives), ("axes", axes), ("control", controls)):
         free[kind] = SimpleQueue()
         for name in served.urls:
             free[kind].put(FarEnd(served, name))
@@ -433,6 +493,7 @@ def carried_out(wanted: Iterable[Cell], folder: Path) -> Iterator[dict[Cell, Fut
             pool = {
                 "drive": pools.enter_context(ThreadPoolExecutor(DRIVES)),
                 "axes": pools.enter_context(ThreadPoolExecutor(LINES)),
+                "control": pools.enter_context(ThreadPoolExecutor(CONTROLS)),
             }
             longest_first = sorted(wanted, key=lambda cell: cell.code != IN_DOUBT)
             yield {
@@ -440,8 +501,8 @@ def carried_out(wanted: Iterable[Cell], folder: Path) -> Iterator[dict[Cell, Fut
                 for number, cell in enumerate(longest_first)
             }
     finally:
-        ended = drives.close(), axes.close()
-    assert ended == (0, 0)
+        ended = drives.close(), axes.close(), controls.close()
+    assert ended == (0, 0, 0)
 
 
 def far_end_of(cell: Cell) -> str:

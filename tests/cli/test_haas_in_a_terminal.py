@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from tests.fakes.terminal import LIMIT_S, Terminal
 
-from compax_aio.simulator.haas import Knobs, SimulatedControl
+from compax_aio.simulator.haas import Knobs, LogKind, SimulatedControl
 from compax_aio.simulator.server import serve_pty, serve_tcp
 
 pytestmark = pytest.mark.real_time
@@ -135,6 +135,7 @@ async def test_parameters_are_sent_when_the_word_is_typed(open_terminal: Open, t
             terminal.types(typed)
             if not code:
                 await terminal.sees("press RECV")
+                await until(lambda: control.log.texts(LogKind.CONNECTED))
                 control.press_recv("parameters")
             assert (await terminal.ends())[0] == code
             assert (control.memory.parameters[1] == "5") is (code == 0)
@@ -149,6 +150,7 @@ async def test_a_drip_feed_is_asked_about(open_terminal: Open, program: Path) ->
             terminal.types(typed)
             if not code:
                 await terminal.sees("press MDI/DNC twice")
+                await until(lambda: control.log.texts(LogKind.CONNECTED))
                 control.press_dnc()
             assert (await terminal.ends())[0] == code
 

@@ -12,6 +12,8 @@ import pytest
 
 from compax_aio.transports import line_errors
 from compax_aio.transports.line_errors import LineErrors, line_errors_of
+from compax_aio.transports.line_settings import LineSettings
+from compax_aio.transports.serial_backends import open_port
 
 
 class _Port:
@@ -80,6 +82,17 @@ def test_what_is_no_port_or_went_away_has_no_counters(linux: pytest.MonkeyPatch)
     assert line_errors_of(object()) is None
     linux.setattr(line_errors, "_ASK", closed)
     assert line_errors_of(_Port()) is None
+
+
+def test_a_closed_port_of_either_library_has_no_counters(linux: pytest.MonkeyPatch) -> None:
+    linux.setattr(line_errors, "_ASK", lambda *_: bytes(80))
+    for backend in ("pyserial", "serialx"):
+        device_end, port_end = os.openpty()
+        port = open_port(backend, os.ttyname(port_end), LineSettings(), dsrdtr=False)
+        port.close()
+        assert line_errors_of(port) is None
+        os.close(device_end)
+        os.close(port_end)
 
 
 def test_other_systems_have_no_counters(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -90,7 +90,7 @@ def line_errors_of(port: Any) -> LineErrors | None:
         return None
     try:
         data = _ASK(port.fileno(), _COUNTERS, bytes(_STRUCT.size))
-    except (OSError, ValueError, AttributeError, TypeError):  # none, closed, or no port at all
+    except (OSError, ValueError, AttributeError, TypeError, AssertionError):  # none, closed (serialx asserts), no port
         return None
     frame, overrun, parity, breaks, buffer_overrun = _STRUCT.unpack(data)[_FRAME : _FRAME + 5]
     return LineErrors(parity=parity, frame=frame, overrun=overrun, breaks=breaks, buffer_overrun=buffer_overrun)
