@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import asyncio
-from collections.abc import AsyncIterator
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol, get_args
+from typing import Literal, Protocol, get_args
 
-from ..checked_numbers import check_number
-from ..errors import CompaxError, InvalidCommandError
+from ..errors import InvalidCommandError
+from ..motion.moves import fetch_error
+from ..motion.under_way import UnderWay, WorkOwner
 from .pacing import HANDSHAKES, Handshake
 
 __all__ = [
@@ -106,17 +105,8 @@ class CutResult:
     warnings: tuple[str, ...] = ()
 
 
-class CutOwner(Protocol):
+class CutOwner(WorkOwner[CutProgress, CutAccount], Protocol):
     """Who carries a job out."""
-
-    def snapshot(self) -> CutProgress:
-        """Say how far it is."""
-
-    def account(self) -> CutAccount:
-        """Say what is known of it."""
-
-    def abandon(self) -> None:
-        """Deal with a job that was cancelled."""
 
     async def pause(self) -> None:
         """Send no more."""
@@ -128,12 +118,13 @@ class CutOwner(Protocol):
         """Stop it, and return when the machine can be used."""
 
 
-class Cut(asyncio.Future[CutResult]):
+class Cut(UnderWay[CutResult, CutProgress, CutAccount]):
     """
     A job under way; awaiting it gives a :class:`CutResult`, or raises why it is not cut.
 
     Cancelling it (also by a time-out around it, a failing task group, leaving the cutter's block, Ctrl-C) aborts the
     job, unless it was made with ``on_cancel="finish"``: then it is cut to its end, and leaving the block waits for it.
+    ``.K`` is written before :meth:`cancel` returns, if anything of the job was.
 
     Attributes:
         description: What is cut, in a few words.
@@ -142,50 +133,10 @@ class Cut(asyncio.Future[CutResult]):
     """
 
     def __init__(self, owner: CutOwner, description: str, on_cancel: OnCancel) -> None:
-        super().__init__()
-        self.description = description
+        super().__init__(owner, description)
         self.on_cancel = on_cancel
-        self.failure: CompaxError | None = None
-        self._owner = owner
+        self._owner: CutOwner = owner
         self._is_aborted_by_caller = False
-        self._changed = asyncio.Event()
-        self.add_done_callback(lambda _: self._changed.set())
-
-    @property
-    def account(self) -> CutAccount:
-        """What is known of the job now: what was sent, what was taken."""
-        return self._owner.account()
-
-    def cancel(self, msg: Any = None) -> bool:
-        """Give the job up; ``.K`` is written before this returns, if anything of the job was."""
-        if not super().cancel(msg):
-            return False
-        self._owner.abandon()
-        return True
-
-    async def progress(self, *, interval_s: float = 0.1) -> AsyncIterator[CutProgress]:
-        """
-        Yield how far the job is, whenever that changes, and once at its end.
-
-        Args:
-            interval_s: Shortest time between two of them.
-
-        Yields:
-            The newest state. Errors end the iteration: awaiting the job raises them.
-
-        Raises:
-            InvalidCommandError: The interval is none.
-        """
-        if not check_number("interval_s", interval_s) >= 0:
-            raise InvalidCommandError(f"interval_s is 0 or more, not {interval_s!r}")
-        is_last = False
-        while not is_last:
-            is_last = self.done()
-            self._changed.clear()
-            yield self._owner.snapshot()
-            if not is_last and not self.done():
-                await asyncio.sleep(interval_s)
-                await self._changed.wait()
 
     async def pause(self) -> None:
         """
@@ -212,25 +163,11 @@ class Cut(asyncio.Future[CutResult]):
         self._is_aborted_by_caller = True
         await self._owner.abort()
 
-    # What the one who carries it out tells it -----------------------------------------------------------------------
-
-    def note_change(self) -> None:
-        """Note that it is further, or in another state."""
-        self._changed.set()
-
-    def finish(self, result: CutResult) -> None:
-        """Note that it is cut."""
-        if not self.done():
-            self.set_result(result)
-
     def fail(self, error: BaseException) -> None:
-        """Raise *error* in whoever awaits it."""
-        if isinstance(error, CompaxError):
-            self.failure = error
-        if not self.done():
-            self.set_exception(error)
-            if self._is_aborted_by_caller:
-                self.exception()  # whoever aborts it knows, and need not await it
+        """Raise *error* in whoever awaits it; whoever has aborted it knows, and need not await it."""
+        super().fail(error)
+        if self._is_aborted_by_caller:
+            fetch_error(self)
 
 
 def check_manner(handshake: object, on_cancel: object) -> None:

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal, Protocol, TypeVar
+from typing import TYPE_CHECKING, Final, Literal, TypeVar
 
-from ..checked_numbers import check_number
-from ..errors import CompaxError, InvalidCommandError
+from ..motion.under_way import UnderWay
 
 if TYPE_CHECKING:
     from ..transports.line_errors import LineErrors
@@ -25,7 +22,6 @@ __all__ = [
     "Sent",
     "Transfer",
     "TransferAccount",
-    "TransferOwner",
     "TransferPhase",
     "TransferProgress",
     "Way",
@@ -46,8 +42,6 @@ be compared. ``over``: it has ended.
 _ResultT = TypeVar("_ResultT")
 
 _MOST_PLACES: Final = 20
-_LOOK_S: Final = 0.25
-"""So often it is looked how far a transfer is."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -184,20 +178,7 @@ class Sent:
     warnings: tuple[str, ...] = ()
 
 
-class TransferOwner(Protocol):
-    """Who carries a transfer out."""
-
-    def snapshot(self) -> TransferProgress:
-        """Say how far it is."""
-
-    def account(self) -> TransferAccount:
-        """Say what is known of it."""
-
-    def abandon(self) -> None:
-        """Deal with a transfer that was cancelled."""
-
-
-class Transfer(asyncio.Future[_ResultT]):
+class Transfer(UnderWay[_ResultT, TransferProgress, TransferAccount]):
     """
     A transfer under way; awaiting it gives :class:`Received` or :class:`Sent`, or raises why there is none.
 
@@ -210,80 +191,16 @@ class Transfer(asyncio.Future[_ResultT]):
         failure: The error that it has ended with; None if it has not.
     """
 
-    def __init__(self, owner: TransferOwner, description: str) -> None:
-        super().__init__()
-        self.description = description
-        self.failure: CompaxError | None = None
-        self._owner = owner
-        self._changed = asyncio.Event()
-        self.add_done_callback(lambda _: self._changed.set())
+    _look_s = 0.25  # nobody tells of each byte that leaves
 
     @property
     def phase(self) -> TransferPhase:
         """What is going on."""
         return self._owner.snapshot().phase
 
-    @property
-    def account(self) -> TransferAccount:
-        """What is known of it now."""
-        return self._owner.account()
-
-    def cancel(self, msg: Any = None) -> bool:
-        """Give the transfer up; nothing more of the file is written from now on."""
-        if not super().cancel(msg):
-            return False
-        self._owner.abandon()
-        return True
-
-    async def progress(self, *, interval_s: float = 0.1) -> AsyncIterator[TransferProgress]:
-        """
-        Yield how far the transfer is, whenever that changes, and once at its end.
-
-        Args:
-            interval_s: Shortest time between two of them.
-
-        Yields:
-            The newest state; its *operator* says what has to be done at the control. Errors end the iteration:
-            awaiting the transfer raises them.
-
-        Raises:
-            InvalidCommandError: The interval is none.
-        """
-        if not check_number("interval_s", interval_s) >= 0:
-            raise InvalidCommandError(f"interval_s is 0 or more, not {interval_s!r}")
-        told: TransferProgress | None = None
-        is_last = False
-        while not is_last:
-            is_last = self.done()
-            self._changed.clear()
-            now = self._owner.snapshot()
-            if is_last or told is None or replace(now, elapsed_s=told.elapsed_s) != told:
-                told = now
-                yield now
-            if not is_last and not self.done():
-                await asyncio.sleep(interval_s)
-                with suppress(TimeoutError):  # nobody tells of each byte that leaves
-                    async with asyncio.timeout(_LOOK_S):
-                        await self._changed.wait()
-
-    # What the one who carries it out tells it -----------------------------------------------------------------------
-
-    def note_change(self) -> None:
-        """Note that it is further, or in another phase."""
-        self._changed.set()
+    def _is_news(self, now: TransferProgress, told: TransferProgress) -> bool:
+        return replace(now, elapsed_s=told.elapsed_s) != told
 
     def note_cancelled(self) -> None:
         """Note that whoever carries it out was cancelled."""
-        super().cancel()
-
-    def finish(self, result: _ResultT) -> None:
-        """Note that it has ended well."""
-        if not self.done():
-            self.set_result(result)
-
-    def fail(self, error: BaseException) -> None:
-        """Raise *error* in whoever awaits it."""
-        if isinstance(error, CompaxError):
-            self.failure = error
-        if not self.done():
-            self.set_exception(error)
+        asyncio.Future.cancel(self)  # not to be abandoned any more
