@@ -30,8 +30,6 @@ class Attempts:
         greet: See :class:`~compax_aio.link.link.Link`.
     """
 
-    __slots__ = ("_end", "_greet", "_link", "_reconnecting", "_stats", "_telling", "_turns", "count")
-
     def __init__(
         self,
         link: asyncio.Protocol,

@@ -16,8 +16,6 @@ class TransportEnd(asyncio.Protocol):
         link: Is told.
     """
 
-    __slots__ = ("_link",)
-
     def __init__(self, link: asyncio.Protocol) -> None:
         self._link: asyncio.Protocol | None = link
 
