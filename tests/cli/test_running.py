@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -45,6 +46,39 @@ def raising(error: BaseException, *, mark: bool = False) -> Callable[..., Any]:
         raise error
 
     return moves_nothing(command) if mark else command
+
+
+# Event loops ----------------------------------------------------------------------------------------------------------
+
+
+class LoopOfUvloop(VirtualClockLoop):
+    """What stands for it here, where it need not be installed."""
+
+
+@pytest.mark.parametrize(
+    ("uvloop", "wanted", "expected"),
+    [
+        (SimpleNamespace(new_event_loop=LoopOfUvloop), None, LoopOfUvloop),
+        (SimpleNamespace(new_event_loop=LoopOfUvloop), "uvloop", LoopOfUvloop),
+        (SimpleNamespace(new_event_loop=LoopOfUvloop), "asyncio", VirtualClockLoop),
+        (None, None, VirtualClockLoop),
+    ],
+    ids=["installed", "wanted", "not wanted", "not installed"],
+)
+def test_a_command_runs_on_uvloop_where_that_is_installed_and_nobody_says_otherwise(
+    uvloop: object, wanted: str | None, expected: type[object], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    loops: list[asyncio.AbstractEventLoop] = []
+
+    async def command() -> None:
+        loops.append(asyncio.get_running_loop())
+
+    monkeypatch.setitem(sys.modules, "uvloop", uvloop)
+    monkeypatch.delenv("COMPAX_LOOP", raising=False)
+    if wanted is not None:
+        monkeypatch.setenv("COMPAX_LOOP", wanted)
+    assert carried_out(command) == 0
+    assert [type(loop) for loop in loops] == [expected]
 
 
 # Exit codes -----------------------------------------------------------------------------------------------------------

@@ -7,8 +7,9 @@ import inspect
 import logging
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Coroutine, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from importlib import import_module
 from typing import Any, Final
 
 from cyclopts import App, CycloptsError
@@ -23,6 +24,8 @@ __all__ = ["run_words"]
 
 _TRACEBACK_VARIABLE: Final = "COMPAX_TRACEBACK"
 """Set to 1, it lets a defect be seen whole, for a report."""
+_LOOP_VARIABLE: Final = "COMPAX_LOOP"
+"""Set to ``asyncio``, it keeps to the event loop of Python although uvloop is installed."""
 
 
 def run_words(app: App, words: Sequence[str], prepare: Callable[[Sequence[str]], None] = lambda _: None) -> int:
@@ -129,8 +132,7 @@ def _carry_out(command: Callable[..., Any], bound: inspect.BoundArguments, inter
 
     if inspect.iscoroutinefunction(command):
         try:
-            # By the name of the module, so that tests can let it run on a virtual clock.
-            result = asyncio.run(watched())
+            result = _run(watched())
         except asyncio.CancelledError:
             if interruption.signal is None:
                 raise
@@ -138,6 +140,24 @@ def _carry_out(command: Callable[..., Any], bound: inspect.BoundArguments, inter
     else:
         result = command(*bound.args, **bound.kwargs)
     return result if isinstance(result, int) and not isinstance(result, bool) else OK
+
+
+def _run(work: Coroutine[Any, Any, Any]) -> Any:
+    """Run *work* to its end, on uvloop where that is installed: it takes less of the CPU."""
+    make_loop = _uvloop() if os.environ.get(_LOOP_VARIABLE) != "asyncio" else None
+    if make_loop is None:
+        return asyncio.run(work)  # by the name of the module, so that tests can let it run on a virtual clock
+    with asyncio.Runner(loop_factory=make_loop) as runner:
+        return runner.run(work)
+
+
+def _uvloop() -> Callable[[], asyncio.AbstractEventLoop] | None:
+    """Return what makes event loops of uvloop; None where that is not installed."""
+    try:
+        make_loop: Callable[[], asyncio.AbstractEventLoop] = import_module("uvloop").new_event_loop
+    except ImportError:
+        return None
+    return make_loop
 
 
 def _only_one(error: BaseException) -> BaseException:
