@@ -20,6 +20,7 @@ from .compax.drive import SimulatedDrive
 from .compax.knobs import Knobs
 from .haas.control import SimulatedControl
 from .haas.knobs import Knobs as ControlKnobs
+from .knobs import DeviceKnobs
 from .line import Connection, DeviceLine, SimulatedDevice
 from .smc.knobs import Knobs as LineKnobs
 from .smc.line import SimulatedPartyLine
@@ -44,7 +45,7 @@ _NAME: Final = "name"
 _LAST_PORT: Final = 65_535
 
 _File = str | os.PathLike[str]
-_T = TypeVar("_T", SimulatedDrive, SimulatedPartyLine, SimulatedCutter, SimulatedControl)
+_T = TypeVar("_T", bound=SimulatedDevice)
 
 
 @runtime_checkable
@@ -77,7 +78,7 @@ async def open_simulator(url: TransportURL, protocol_factory: ProtocolFactory) -
     if url.host not in _KINDS:
         raise TransportError(f"there is no simulated {url.host!r}", hint=f"kinds of device: {', '.join(_KINDS)}")
     query = {key: value for key, value in url.query.items() if key != _NAME}
-    line = DeviceLine.of(_KINDS[url.host](query, url.query.get(_NAME)))
+    line = DeviceLine.of(_device(url.host, query, url.query.get(_NAME)))
     # A connection that has just been lost at this end is given back in the next turn of the loop.
     for _ in range(2):
         if line.occupied:
@@ -105,44 +106,17 @@ def drive_named(name: str, knobs: Knobs | None = None) -> SimulatedDrive:
 
 
 def line_named(name: str, knobs: LineKnobs | None = None) -> SimulatedPartyLine:
-    """
-    Return the line that ``sim://smc?name=...`` opens in the running event loop; it is made if there is none.
-
-    Args:
-        name: Any text.
-        knobs: What the line must be like; None: the default for a new one, and anything for one that exists.
-
-    Raises:
-        TransportError: The line exists and has other knobs, or a device of another kind has that name.
-    """
+    """Return the line that ``sim://smc?name=...`` opens, like :func:`drive_named`; raises TransportError."""
     return _named(SimulatedPartyLine, name, knobs)
 
 
 def cutter_named(name: str, knobs: CutterKnobs | None = None) -> SimulatedCutter:
-    """
-    Return the cutter that ``sim://camm1?name=...`` opens in the running event loop; it is made if there is none.
-
-    Args:
-        name: Any text.
-        knobs: What the cutter must be like; None: the default for a new one, and anything for one that exists.
-
-    Raises:
-        TransportError: The cutter exists and has other knobs, or a device of another kind has that name.
-    """
+    """Return the cutter that ``sim://camm1?name=...`` opens, like :func:`drive_named`; raises TransportError."""
     return _named(SimulatedCutter, name, knobs)
 
 
 def control_named(name: str, knobs: ControlKnobs | None = None) -> SimulatedControl:
-    """
-    Return the control that ``sim://haas?name=...`` opens in the running event loop; it is made if there is none.
-
-    Args:
-        name: Any text.
-        knobs: What the control must be like; None: the default for a new one, and anything for one that exists.
-
-    Raises:
-        TransportError: The control exists and has other knobs, or a device of another kind has that name.
-    """
+    """Return the control that ``sim://haas?name=...`` opens, like :func:`drive_named`; raises TransportError."""
     return _named(SimulatedControl, name, knobs)
 
 
@@ -333,6 +307,13 @@ async def _hang_up(connections: set[Connection]) -> None:
     await asyncio.sleep(0)  # in which their connection_lost is called
 
 
+def _device(host: str, query: Mapping[str, str], name: str | None) -> SimulatedDevice:
+    """Return the device of a URL, of the kind that its host says; one without a name is a new one."""
+    kind, knobs_kind = _KINDS[host]
+    knobs = knobs_kind.from_query(query)
+    return kind(knobs) if name is None else _named(kind, name, knobs if query else None)
+
+
 def _named(kind: Callable[..., _T], name: str, knobs: Any) -> _T:
     """Return the device of that name in the running event loop, of that kind; it is made if there is none."""
     loop = asyncio.get_running_loop()
@@ -352,31 +333,11 @@ def _named(kind: Callable[..., _T], name: str, knobs: Any) -> _T:
     return device
 
 
-def _compax(query: Mapping[str, str], name: str | None) -> SimulatedDrive:
-    knobs = Knobs.from_query(query)
-    return SimulatedDrive(knobs) if name is None else drive_named(name, knobs if query else None)
-
-
-def _smc(query: Mapping[str, str], name: str | None) -> SimulatedPartyLine:
-    knobs = LineKnobs.from_query(query)
-    return SimulatedPartyLine(knobs) if name is None else line_named(name, knobs if query else None)
-
-
-def _camm1(query: Mapping[str, str], name: str | None) -> SimulatedCutter:
-    knobs = CutterKnobs.from_query(query)
-    return SimulatedCutter(knobs) if name is None else cutter_named(name, knobs if query else None)
-
-
-def _haas(query: Mapping[str, str], name: str | None) -> SimulatedControl:
-    knobs = ControlKnobs.from_query(query)
-    return SimulatedControl(knobs) if name is None else control_named(name, knobs if query else None)
-
-
-_KINDS: Final[Mapping[str, Callable[[Mapping[str, str], str | None], SimulatedDevice]]] = {
-    "compax": _compax,
-    "smc": _smc,
-    "camm1": _camm1,
-    "haas": _haas,
+_KINDS: Final[Mapping[str, tuple[Callable[..., SimulatedDevice], type[DeviceKnobs]]]] = {
+    "compax": (SimulatedDrive, Knobs),
+    "smc": (SimulatedPartyLine, LineKnobs),
+    "camm1": (SimulatedCutter, CutterKnobs),
+    "haas": (SimulatedControl, ControlKnobs),
 }
 
 _devices: dict[asyncio.AbstractEventLoop, dict[str, Any]] = {}

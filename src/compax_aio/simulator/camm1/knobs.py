@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Final, Literal, Self
+from typing import Annotated, Any, ClassVar, Final, Literal
 
 from compax_aio.camm1.facts.handshakes import AckRule, XonRule
 from compax_aio.camm1.facts.models import MODELS, Model
 from compax_aio.camm1.facts.reports import StatusStyle
 
-from ..knob_fields import Range, check_knobs, impossible, knobs_from_query
+from ..knob_fields import Range, impossible
+from ..knobs import DeviceKnobs, Probability, Seconds
 
 __all__ = ["Knobs"]
 
-_DEVICE: Final = "CAMM-1 cutter"
 _SPARE_BUFFER: Final = 1024
 _USUAL_SPEEDS: Final = (1.0, 20.0)
 _MOST_BYTES: Final = 1_000_000
@@ -36,14 +35,12 @@ class _Answer:
         return 0 < len(value) <= 40 and value.isascii() and value.isprintable()
 
 
-_Seconds = Annotated[float, Range(0, 3600)]
-_Probability = Annotated[float, Range(0, 1)]
 _Speed = Annotated[float, Range(0.1, 10_000)]
 _Bytes = Annotated[int, Range(0, _MOST_BYTES)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Knobs:
+class Knobs(DeviceKnobs):
     """
     How one simulated cutter behaves where no source at hand says it, and how fast it is.
 
@@ -52,6 +49,8 @@ class Knobs:
     Raises:
         TransportError: A value is not possible; says which are.
     """
+
+    device: ClassVar[str] = "CAMM-1 cutter"
 
     model: Annotated[str, _ModelName()] = "PNC-1610"
     """Which machine; it decides instructions, sizes, and how questions are answered."""
@@ -156,9 +155,9 @@ class Knobs:
     """Of the tool when it is down and VS has not said another."""
     travel_cm_s: _Speed = 40.0
     """Of the tool when it is up."""
-    vector_time_s: _Seconds = 0.005
+    vector_time_s: Seconds = 0.005
     """What each vector takes besides its length."""
-    instruction_time_s: _Seconds = 0.0005
+    instruction_time_s: Seconds = 0.0005
     """What an instruction takes that moves nothing."""
     time_factor: Annotated[float, Range(0, 1000)] = 1.0
     """Everything takes so many times as long; 0: no time."""
@@ -171,37 +170,28 @@ class Knobs:
 
     seed: Annotated[int, Range(0, 2**32)] = 0
     """Of all chance."""
-    lose_reply: _Probability = 0.0
+    lose_reply: Probability = 0.0
     """For each reply: it does not come."""
-    garble_reply: _Probability = 0.0
+    garble_reply: Probability = 0.0
     """For each reply: one character of it is another."""
-    late_reply: _Probability = 0.0
+    late_reply: Probability = 0.0
     """For each reply: it comes ``late_s`` later."""
-    late_s: _Seconds = 1.0
+    late_s: Seconds = 1.0
     """How much later."""
-    lose_xon: _Probability = 0.0
+    lose_xon: Probability = 0.0
     """For each Xon: it does not come."""
-    spoil_byte: _Probability = 0.0
+    spoil_byte: Probability = 0.0
     """For each byte of the host: it arrives as another, with error 15."""
-    stray_byte: _Probability = 0.0
+    stray_byte: Probability = 0.0
     """For each device control instruction: a byte out of nothing is sent to the host."""
 
-    def __post_init__(self) -> None:
-        check_knobs(self, _DEVICE)
+    def _check_together(self) -> None:
         if self.logical_size > self.physical_bytes:
-            raise impossible(_DEVICE, "logical_size", self.logical_size, f"at most {self.physical_bytes}, as physical")
+            raise impossible(
+                self.device, "logical_size", self.logical_size, f"at most {self.physical_bytes}, as physical"
+            )
         if self.physical_size == 1:
-            raise impossible(_DEVICE, "physical_size", 1, "0, or 2 at least")
-
-    @classmethod
-    def from_query(cls, query: Mapping[str, str]) -> Self:
-        """
-        Read knobs from the query of a URL: ``{"model": "PNC-900", "baudrate": "9600"}``.
-
-        Raises:
-            TransportError: No knob has that name, or it cannot be set to that value; names those that are possible.
-        """
-        return knobs_from_query(cls, _DEVICE, query, {})
+            raise impossible(self.device, "physical_size", 1, "0, or 2 at least")
 
     # As the model has it
 

@@ -5,16 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal
 
 from compax_aio.compax.facts.commands import COMMANDS
 from compax_aio.compax.facts.limits import MAX_ACCELERATION_TIME_MS, MAX_POSITION, MAX_SPEED_PERCENT
 
-from ..knob_fields import Range, check_knobs, impossible, knobs_from_query
+from ..knob_fields import Range, impossible
+from ..knobs import DeviceKnobs, Seconds
 
 __all__ = ["Knobs"]
-
-_DEVICE: Final = "COMPAX"
 
 
 class _NewWord:
@@ -31,12 +30,11 @@ class _NewWord:
 
 
 _Position = Annotated[float, Range(-MAX_POSITION, MAX_POSITION)]
-_Seconds = Annotated[float, Range(0, 3600)]
 _RampTime = Annotated[int, Range(0, MAX_ACCELERATION_TIME_MS)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Knobs:
+class Knobs(DeviceKnobs):
     """
     How one simulated drive behaves where the manuals leave it open, and what it moves.
 
@@ -45,6 +43,8 @@ class Knobs:
     Raises:
         TransportError: A value is not possible; says which are.
     """
+
+    device: ClassVar[str] = "COMPAX"
 
     # How it answers
 
@@ -107,11 +107,11 @@ class Knobs:
 
     baudrate: Literal[0, 9600, 4800] = 0
     """Byte timing of both directions, ten bits a byte; 0: bytes take no time."""
-    answer_time_s: _Seconds = 0.002
+    answer_time_s: Seconds = 0.002
     """From the CR of a line to its execution and the first byte of its answer (not documented)."""
     record_time_s: Annotated[float, Range(0.0001, 3600)] = 0.002
     """What a record of the program takes (not documented)."""
-    self_test_s: _Seconds = 0.0
+    self_test_s: Seconds = 0.0
     """After power-on, S16 bit 1 stays 0 and positioning is refused for so long (UG p. 209; the time is unknown)."""
 
     # The axis
@@ -139,17 +139,10 @@ class Knobs:
     following_error_factor: Annotated[float, Range(0, 1)] = 0.001
     """Following error in units for each unit per second: the time in s by which the axis lags behind."""
 
-    def __post_init__(self) -> None:
-        check_knobs(self, _DEVICE)
+    def _check_together(self) -> None:
         if self.travel_min >= self.travel_max:
-            raise impossible(_DEVICE, "travel_min", self.travel_min, f"less than travel_max, {self.travel_max:g}")
+            raise impossible(self.device, "travel_min", self.travel_min, f"less than travel_max, {self.travel_max:g}")
 
     @classmethod
-    def from_query(cls, query: Mapping[str, str]) -> Self:
-        """
-        Read knobs from the query of a URL: ``{"echo": "1", "decimals": "3"}``.
-
-        Raises:
-            TransportError: No knob has that name, or it cannot be set to that value; names those that are possible.
-        """
-        return knobs_from_query(cls, _DEVICE, query, {"decimals": 3} if query.get("unit") == "inch" else {})
+    def _defaults_with(cls, query: Mapping[str, str]) -> Mapping[str, Any]:
+        return {"decimals": 3} if query.get("unit") == "inch" else {}

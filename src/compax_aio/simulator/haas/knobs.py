@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Final, Literal, Self
+from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
 from compax_aio.haas.facts.eob import EobPattern
 from compax_aio.haas.facts.port_settings import Parity, Synchronization
 
-from ..knob_fields import Range, check_knobs, impossible, knobs_from_query
+from ..knob_fields import Range, impossible
+from ..knobs import DeviceKnobs, Probability, Seconds
 from .presses import KeyWords
 from .sets import SETS
 
 __all__ = ["Knobs"]
 
-_DEVICE: Final = "Haas control"
 _MOST_BYTES: Final = 1_000_000
 
 
@@ -44,14 +43,12 @@ class _Text:
 
 
 _PROFILE: Final = "profile"
-_Seconds = Annotated[float, Range(0, 3600)]
-_Probability = Annotated[float, Range(0, 1)]
 _Bytes = Annotated[int, Range(0, _MOST_BYTES)]
 _Rate = Annotated[float, Range(0, 1e9)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Knobs:
+class Knobs(DeviceKnobs):
     """
     How one simulated control is set, behaves where no source at hand says it, and fails.
 
@@ -60,6 +57,8 @@ class Knobs:
     Raises:
         TransportError: A value is not possible; says which are.
     """
+
+    device: ClassVar[str] = "Haas control"
 
     profile: Annotated[str, _Word(*SETS)] = "classic"
     """Set of settings; it decides all of them that are left at ``profile``. The baud rate is a knob of its own."""
@@ -127,13 +126,13 @@ class Knobs:
     """DC3 (reader off) does not come."""
     drop_dc4: bool = False
     """DC4 (punch off) does not come."""
-    dc1_delay_s: _Seconds = 0.0
+    dc1_delay_s: Seconds = 0.0
     """DC1 comes so late."""
-    dc2_delay_s: _Seconds = 0.0
+    dc2_delay_s: Seconds = 0.0
     """DC2 comes so late, and the data behind it."""
-    dc3_delay_s: _Seconds = 0.0
+    dc3_delay_s: Seconds = 0.0
     """DC3 comes so late."""
-    dc4_delay_s: _Seconds = 0.0
+    dc4_delay_s: Seconds = 0.0
     """DC4 comes so long after the data."""
     nak_every_s: Annotated[float, Range(0.01, 3600)] = 1.0
     """Spacing of the NAK with which a receive operation by XMODEM begins."""
@@ -160,9 +159,9 @@ class Knobs:
     """ALL is sent within one pair of %, or each program within its own."""
     end_of_receive: Literal["percent", "eob", "silence"] = "percent"
     """What ends a receive operation: the second %, its end of block, or silence behind it, so that more may follow."""
-    silence_s: _Seconds = 1.0
+    silence_s: Seconds = 1.0
     """How long that silence is."""
-    input_timeout_s: _Seconds = 0.0
+    input_timeout_s: Seconds = 0.0
     """A receive operation in which nothing comes for so long ends with alarm 412; 0: it waits for RESET."""
     garbled_as_comment: bool = True
     """A block that is none is stored as a comment, with an alarm; otherwise it is stored as it came."""
@@ -181,7 +180,7 @@ class Knobs:
 
     # DNC
 
-    dnc_block_s: _Seconds = 0.0
+    dnc_block_s: Seconds = 0.0
     """How long the execution of a block lasts."""
     look_ahead: Annotated[int, Range(1, 10_000)] = 15
     """Blocks that are read and not begun; then no more is taken out of the buffer."""
@@ -198,7 +197,7 @@ class Knobs:
     """What Q101 answers."""
     model: Annotated[str, _Text(20)] = "VF2"
     """What Q102 answers."""
-    answer_time_s: _Seconds = 0.0
+    answer_time_s: Seconds = 0.0
     """From the end of a request to the begin of its answer."""
     value_width: Annotated[int, Range(1, 30)] = 10
     """Blanks fill the value of a variable up to so many characters."""
@@ -210,7 +209,7 @@ class Knobs:
     """The first request of a connection is not answered, as on newer controls."""
     freeze_after: Annotated[int, Range(0, 1_000_000)] = 0
     """So many requests too close to each other freeze the control; 0: it never freezes."""
-    freeze_gap_s: _Seconds = 0.05
+    freeze_gap_s: Seconds = 0.05
     """A request is too close to the answer before it if the line was quiet for less."""
     freeze_ends: Literal["reset", "power"] = "reset"
     """What ends that."""
@@ -220,36 +219,36 @@ class Knobs:
     """How often."""
     dprnt_inside: bool = False
     """What is printed comes inside the next answer, not between answers."""
-    cycle_s: _Seconds = 0.0
+    cycle_s: Seconds = 0.0
     """Cycles of so long run by themselves, with a pause as long as one between them; 0: none does."""
 
     # Trouble, by chance
 
     seed: Annotated[int, Range(0, 2**32)] = 0
     """Of all chance."""
-    parity_fault: _Probability = 0.0
+    parity_fault: Probability = 0.0
     """For each byte of a file that comes: its parity is wrong."""
-    framing_fault: _Probability = 0.0
+    framing_fault: Probability = 0.0
     """For each byte of a file that comes: its stop bit is."""
-    spoil_sent: _Probability = 0.0
+    spoil_sent: Probability = 0.0
     """For each byte that the control sends: one of its bits is another."""
-    lose_xon: _Probability = 0.0
+    lose_xon: Probability = 0.0
     """For each Xon: it does not come."""
-    lose_xoff: _Probability = 0.0
+    lose_xoff: Probability = 0.0
     """For each Xoff: it does not come."""
-    refuse_block: _Probability = 0.0
+    refuse_block: Probability = 0.0
     """For each good block of XMODEM: it is answered by NAK."""
-    lose_reply: _Probability = 0.0
+    lose_reply: Probability = 0.0
     """For each answer of data collection: it does not come."""
-    garble_reply: _Probability = 0.0
+    garble_reply: Probability = 0.0
     """For each answer: one character of it is another."""
-    double_reply: _Probability = 0.0
+    double_reply: Probability = 0.0
     """For each answer: it comes twice."""
-    late_reply: _Probability = 0.0
+    late_reply: Probability = 0.0
     """For each answer: it comes ``late_s`` later."""
-    late_s: _Seconds = 1.0
+    late_s: Seconds = 1.0
     """How much later."""
-    foreign_reply: _Probability = 0.0
+    foreign_reply: Probability = 0.0
     """For each request: an answer to another host comes first, as over Ethernet."""
 
     # Hands
@@ -257,33 +256,22 @@ class Knobs:
     press: Annotated[str, KeyWords()] = ""
     """Keys that press themselves, each after the operation before is over: recv, recv:settings, send:O00010, send:ALL,
     send:last, dnc, cycle; several with commas."""
-    press_after_s: _Seconds = 1.0
+    press_after_s: Seconds = 1.0
     """From the first connection to the first key; recv and dnc come at once where no sign tells the host to begin."""
-    press_pause_s: _Seconds = 3.0
+    press_pause_s: Seconds = 3.0
     """From the end of an operation to the next key."""
     press_again: bool = False
     """After the last key the first one follows."""
     program_blocks: Annotated[int, Range(1, 1_000_000)] = 12
     """Blocks of the program O00010 that is in memory."""
 
-    def __post_init__(self) -> None:
-        check_knobs(self, _DEVICE)
+    def _check_together(self) -> None:
         if self.lwm >= self.hwm:
-            raise impossible(_DEVICE, "lwm", self.lwm, f"less than hwm, which is {self.hwm}")
+            raise impossible(self.device, "lwm", self.lwm, f"less than hwm, which is {self.hwm}")
         if self.mode is Synchronization.XMODEM and self.bits == 7:
-            raise impossible(_DEVICE, "data_bits", 7, "8 with XMODEM, whose first block has a byte FE already")
+            raise impossible(self.device, "data_bits", 7, "8 with XMODEM, whose first block has a byte FE already")
         if self.parity_in_bytes and (self.bits == 8 or self.parity_bit is Parity.NONE):
-            raise impossible(_DEVICE, "parity_in_bytes", 1, "0, unless there are 7 data bits and a parity")
-
-    @classmethod
-    def from_query(cls, query: Mapping[str, str]) -> Self:
-        """
-        Read knobs from the query of a URL: ``{"profile": "xmodem", "baudrate": "9600"}``.
-
-        Raises:
-            TransportError: No knob has that name, or it cannot be set to that value; names those that are possible.
-        """
-        return knobs_from_query(cls, _DEVICE, query, {})
+            raise impossible(self.device, "parity_in_bytes", 1, "0, unless there are 7 data bits and a parity")
 
     @classmethod
     def named(cls, profile: str, **others: Any) -> Self:

@@ -6,15 +6,15 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, ClassVar, Final, Literal
 
 from compax_aio.smc.facts import COMMANDS, INSTRUCTION_BYTES, MAX_AXES, POSSIBLE_NAMES, Mode
 
-from ..knob_fields import Range, check_knobs, impossible, knobs_from_query
+from ..knob_fields import Range, impossible
+from ..knobs import DeviceKnobs, Probability, Seconds
 
 __all__ = ["SIGN_ONS", "Knobs"]
 
-_DEVICE: Final = "SMC line"
 _OTHER_INSTRUCTION_BYTES: Final = 5
 _NO_LIMIT: Final = 1e12
 
@@ -52,15 +52,13 @@ class _Lengths:
         return all(self._FORM.fullmatch(each) for each in value.split())
 
 
-_Seconds = Annotated[float, Range(0, 3600)]
 _ServiceTime = Annotated[float, Range(0.00001, 1)]
-_Probability = Annotated[float, Range(0, 1)]
 _Place = Annotated[float, Range(-_NO_LIMIT, _NO_LIMIT)]
 _Speed = Annotated[int, Range(1, 1_000_000)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Knobs:
+class Knobs(DeviceKnobs):
     """
     How one simulated line and its axes behave where no source at hand says it, and what they move.
 
@@ -69,6 +67,8 @@ class Knobs:
     Raises:
         TransportError: A value is not possible; says which are.
     """
+
+    device: ClassVar[str] = "SMC line"
 
     # The line
 
@@ -97,7 +97,7 @@ class Knobs:
     """The same while the axis steps (not documented)."""
     jitter: Annotated[float, Range(0, 1)] = 0.0
     """Service times are longer by up to this part, by chance."""
-    execution_time_s: _Seconds = 0.001
+    execution_time_s: Seconds = 0.001
     """From the terminator of a command to its execution (not documented); characters wait in the UART meanwhile."""
 
     # Entry
@@ -116,7 +116,7 @@ class Knobs:
     """What follows the sign-on at once: as known of it, nothing, ``#``, or ``#`` CR LF."""
     prompt: Literal["framed", "bare"] = "framed"
     """The answer to an empty line in single mode: ``#`` CR LF or ``#``."""
-    reset_time_s: _Seconds = 0.15
+    reset_time_s: Seconds = 0.15
     """After a reset nothing is received for so long (drivers wait 0.2 to 1 s)."""
     reset_keeps_position: bool = False
     """^C leaves the position as it is; gem-controld says that it becomes 0."""
@@ -170,7 +170,7 @@ class Knobs:
     """The direction of F that is plus: motorIms 0, panther 1."""
     limit_bits: Literal["ims", "panther", "789a"] = "ims"
     """The answer to ``]``: plus 1, minus 2, ``]1`` home 1; plus 2, minus 1; moving 2, home 32 after A8, 64, 128."""
-    hunt_time_s: _Seconds = 0.0
+    hunt_time_s: Seconds = 0.0
     """After a move the axis corrects its position for so long; that is bit 4 of ``^`` alone."""
 
     # The program
@@ -188,49 +188,38 @@ class Knobs:
 
     seed: Annotated[int, Range(0, 2**32)] = 0
     """Of all chance."""
-    lose_echo: _Probability = 0.0
+    lose_echo: Probability = 0.0
     """For each echo: it is not sent."""
-    garble_echo: _Probability = 0.0
+    garble_echo: Probability = 0.0
     """For each echo: it is another character."""
-    flip_bit: _Probability = 0.0
+    flip_bit: Probability = 0.0
     """For each character that arrives: one bit is changed."""
-    lose_character: _Probability = 0.0
+    lose_character: Probability = 0.0
     """For each character that arrives: it does not."""
-    noise: _Probability = 0.0
+    noise: Probability = 0.0
     """For each character that arrives: a character out of nothing is sent to the host."""
-    stick: _Probability = 0.0
+    stick: Probability = 0.0
     """For each character that arrives: nothing goes to the host for ``stick_s``."""
-    stick_s: _Seconds = 1.0
+    stick_s: Seconds = 1.0
     """How long that lasts."""
-    late_answer: _Probability = 0.0
+    late_answer: Probability = 0.0
     """For each command: it is executed in time, and its answer comes ``late_s`` later."""
-    late_s: _Seconds = 1.0
+    late_s: Seconds = 1.0
     """How much later."""
-    spontaneous_reset: _Probability = 0.0
+    spontaneous_reset: Probability = 0.0
     """For each character that an axis reads: it resets itself."""
-    jog: _Probability = 0.0
+    jog: Probability = 0.0
     """For each character that an axis reads while it stands: somebody moves it by ``jog_distance``."""
     jog_distance: Annotated[float, Range(-1e6, 1e6)] = 100.0
     """In steps; below zero toward minus."""
 
-    def __post_init__(self) -> None:
-        check_knobs(self, _DEVICE)
+    def _check_together(self) -> None:
         if self.limit_min >= self.limit_max:
-            raise impossible(_DEVICE, "limit_min", self.limit_min, f"less than limit_max, {self.limit_max:g}")
+            raise impossible(self.device, "limit_min", self.limit_min, f"less than limit_max, {self.limit_max:g}")
         if self.min_speed > self.max_speed:
-            raise impossible(_DEVICE, "min_speed", self.min_speed, f"at most max_speed, {self.max_speed}")
+            raise impossible(self.device, "min_speed", self.min_speed, f"at most max_speed, {self.max_speed}")
         if self.mode == "single" and len(self.axes) > 1:
-            raise impossible(_DEVICE, "axes", self.axes, "one axis in single mode")
-
-    @classmethod
-    def from_query(cls, query: Mapping[str, str]) -> Self:
-        """
-        Read knobs from the query of a URL: ``{"axes": "ABC", "baudrate": "9600"}``.
-
-        Raises:
-            TransportError: No knob has that name, or it cannot be set to that value; names those that are possible.
-        """
-        return knobs_from_query(cls, _DEVICE, query, {})
+            raise impossible(self.device, "axes", self.axes, "one axis in single mode")
 
     @property
     def pin(self) -> Mode:
