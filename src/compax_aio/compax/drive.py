@@ -395,5 +395,5 @@ class Drive(Readings, AxisCommands, Parts):
 
     def _on_lost(self, error: ConnectionLostError) -> None:
         self._events.publish(ConnectionLost(self.name, self._loop.time(), str(error)))
-        self._poller.lost(error)
+        self._poller.end(error)
         self._motion.line_lost(error)

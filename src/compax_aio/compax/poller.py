@@ -6,18 +6,15 @@ import asyncio
 import logging
 import re
 from collections.abc import Awaitable, Callable
-from contextlib import suppress
-from copy import copy
 from dataclasses import dataclass
 from functools import partial
-from itertools import count
 from math import floor, inf
 from types import MappingProxyType
 from typing import Any, Final
-from weakref import WeakValueDictionary
 
 from ..checked_numbers import check_number
 from ..errors import CommandRejectedError, CompaxError, ConnectionLostError, InvalidCommandError
+from ..motion.watching import Watchers
 from .line import DriveLine
 from .parameters import NumberedValues
 from .readings import MAX_STATUS, Readings
@@ -95,16 +92,8 @@ class Poller:
         self._parameters = parameters
         self._variables = variables
         self._loop = asyncio.get_running_loop()
-        self._watches: WeakValueDictionary[int, Watch] = WeakValueDictionary()
-        self._numbers = count()
+        self._watches: Watchers[Watch] = Watchers(line.name, line.link, self._poll)
         self._quantities: dict[str, _Quantity] = {}
-        self._task: asyncio.Task[None] | None = None
-        self._is_reading = False
-        self._joined: asyncio.Future[None] | None = None
-        self._is_over = False
-        self._lost: ConnectionLostError | None = None
-
-    # Joining and leaving --------------------------------------------------------------------------------------------
 
     def watch(self, quantities: tuple[str, ...], interval_s: float) -> Watch:
         """Let somebody watch from now on; see :meth:`Drive.watch`."""
@@ -113,65 +102,19 @@ class Poller:
         if not check_number("interval_s", interval_s) > 0:
             raise InvalidCommandError(f"interval_s must be above 0, not {interval_s!r}")
         readers = {name: self._reader(name) for name in quantities}
-        number = next(self._numbers)
-        leave = partial(self._leave, number)
-        watch = Watch(tuple(readers), max(float(interval_s), _SHORTEST_INTERVAL_S), leave, self._dropped)
-        if self._is_over:
-            watch.end(self._loss())
+
+        def begin(leave: Callable[[], None], dropped: Callable[[], None]) -> Watch:
+            watch = Watch(tuple(readers), max(float(interval_s), _SHORTEST_INTERVAL_S), leave, dropped)
+            for name, read in readers.items():
+                quantity = self._quantities.setdefault(name, _Quantity(name, read, watch.interval_s, watch.due_at))
+                quantity.due_at = min(quantity.due_at, watch.due_at)
             return watch
-        self._watches[number] = watch
-        for name, read in readers.items():
-            quantity = self._quantities.setdefault(name, _Quantity(name, read, watch.interval_s, watch.due_at))
-            quantity.due_at = min(quantity.due_at, watch.due_at)
-        if self._joined is not None and not self._joined.done():
-            self._joined.set_result(None)
-        if self._task is None:
-            self._task = self._loop.create_task(self._poll(), name=f"{self._name}: watch")
-        return watch
 
-    def lost(self, error: ConnectionLostError) -> None:
-        """Raise *error* in all who watch, and in those to come."""
-        self._lost = error
-        self._end_all()
+        return self._watches.join(begin)
 
-    def end(self) -> None:
-        """Let all who watch finish, and those to come."""
-        self._lost = None
-        self._end_all()
-
-    def _end_all(self) -> None:
-        self._is_over = True
-        for watch in list(self._watches.values()):
-            watch.end(self._loss())
-        self._look_after()
-
-    def _loss(self) -> ConnectionLostError | None:
-        """Make an error of its own for each consumer: they are raised at different places."""
-        if self._lost is None:
-            return None
-        error = copy(self._lost)
-        error.__cause__ = self._lost.__cause__
-        return error
-
-    def _leave(self, number: int) -> None:
-        # Kept, those who have left would be looked through each time that one more leaves.
-        self._watches.pop(number, None)
-        self._look_after()
-
-    def _dropped(self) -> None:
-        # Whichever thread collects garbage; and the event loop may have ended long ago.
-        with suppress(RuntimeError):
-            self._loop.call_soon_threadsafe(self._look_after)
-
-    def _look_after(self) -> None:
-        """End the task if nobody watches any more; a reading that is under way is carried through first."""
-        if self._task is not None and not self._is_reading and not self._is_watched:
-            task, self._task = self._task, None
-            task.cancel()
-
-    @property
-    def _is_watched(self) -> bool:
-        return any(not watch.has_ended for watch in self._watches.values())
+    def end(self, error: ConnectionLostError | None = None) -> None:
+        """Let all who watch finish, and those to come; or raise *error* in them."""
+        self._watches.end(error)
 
     def _reader(self, name: object) -> Callable[[], Awaitable[Any]]:
         if isinstance(name, str):
@@ -191,51 +134,31 @@ class Poller:
     # Polling --------------------------------------------------------------------------------------------------------
 
     async def _poll(self) -> None:
-        try:
-            while (quantity := self._next_quantity()) is not None:
-                if quantity.due_at > self._loop.time():
-                    await self._wait_until(quantity.due_at)
-                else:
-                    begun_at = self._loop.time()
-                    await self._read(quantity)
-                    self._serve(quantity)
-                    if self._is_watched:
-                        await self._give_way(self._loop.time() - begun_at)
-        except CompaxError:
-            pass  # the line is over: the drive tells all who watch, or has done so
-        except BaseException as error:
-            # A defect, or somebody who cancels every task there is: nobody shall wait for ever.
-            if self._task is asyncio.current_task():
-                for watch in list(self._watches.values()):
-                    watch.end(error if isinstance(error, Exception) else None)
-            raise
-        finally:
-            if self._task is asyncio.current_task():
-                self._task = None
+        while (quantity := self._next_quantity()) is not None:
+            if quantity.due_at > self._loop.time():
+                await self._watches.wait_until(quantity.due_at)
+            else:
+                begun_at = self._loop.time()
+                await self._read(quantity)
+                self._serve(quantity)
+                if self._watches.is_anybody_there:
+                    await self._give_way(self._loop.time() - begun_at)
 
     def _next_quantity(self) -> _Quantity | None:
         """Find what is due first, of what is watched now; it is due as often as the quickest wants it."""
         intervals: dict[str, float] = {}
-        for watch in list(self._watches.values()):
-            if not watch.has_ended:
-                for name in watch.quantities:
-                    intervals[name] = min(watch.interval_s, intervals.get(name, inf))
+        for watch in self._watches:
+            for name in watch.quantities:
+                intervals[name] = min(watch.interval_s, intervals.get(name, inf))
         self._quantities = {name: self._quantities[name] for name in intervals}
         for name, interval_s in intervals.items():
             self._quantities[name].interval_s = interval_s
         return min(self._quantities.values(), key=lambda quantity: quantity.due_at, default=None)
 
-    async def _wait_until(self, due_at: float) -> None:
-        """Wait until *due_at*, or until somebody joins."""
-        self._joined = self._loop.create_future()
-        with suppress(TimeoutError):
-            async with asyncio.timeout_at(due_at):
-                await self._joined
-
     async def _read(self, quantity: _Quantity) -> None:
         error: CompaxError | None = None
         value = None
-        self._is_reading = True
+        self._watches.is_asking = True
         try:
             value = await quantity.read()
         except CompaxError as failure:
@@ -245,7 +168,7 @@ class Poller:
             if quantity.error is None:
                 _log.warning("%s: %s cannot be read: %s", self._name, quantity.name, error)
         finally:
-            self._is_reading = False
+            self._watches.is_asking = False
         quantity.value, quantity.error = value, error
         quantity.at = self._loop.time()
         quantity.due_at = _next_beat(quantity.at, quantity.interval_s)
@@ -255,8 +178,8 @@ class Poller:
     def _serve(self, quantity: _Quantity) -> None:
         """Give a reading to all for whom *quantity* was the last that was missing."""
         made: dict[tuple[str, ...], Reading] = {}
-        for watch in list(self._watches.values()):
-            if quantity.name in watch.quantities and not watch.has_ended:
+        for watch in self._watches:
+            if quantity.name in watch.quantities:
                 parts = [self._quantities[name] for name in watch.quantities]
                 times = [part.at for part in parts if not part.is_refused] or [quantity.at]
                 if min(times) >= watch.due_at - _SAME_TIME_S:

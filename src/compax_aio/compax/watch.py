@@ -10,6 +10,7 @@ from types import MappingProxyType, TracebackType
 from typing import Any, Self
 
 from ..errors import CompaxError, InvalidCommandError
+from ..motion.watching import NewestReadings
 
 __all__ = ["GroupReading", "GroupWatch", "Reading", "Watch"]
 
@@ -57,7 +58,7 @@ GroupReading = Mapping[str, Reading]
 """By axis: its newest reading. An axis that has said nothing yet is not there."""
 
 
-class Watch(AsyncIterator[Reading]):
+class Watch(NewestReadings[Reading]):
     """
     The readings of one drive from now on, the newest only; made by :meth:`Drive.watch`.
 
@@ -71,82 +72,23 @@ class Watch(AsyncIterator[Reading]):
         skipped: Readings that this consumer was too slow to see.
     """
 
-    has_ended = True  # until it is made
-
     def __init__(
         self, quantities: tuple[str, ...], interval_s: float, leave: Callable[[], None], dropped: Callable[[], None]
     ) -> None:
+        super().__init__(interval_s, leave, dropped)
         self.quantities = quantities
-        self.interval_s = interval_s
-        self.skipped = 0
-        self.due_at = asyncio.get_running_loop().time()
-        """What was read before does not count for the next reading."""
-        self.news = asyncio.Event()
-        """Set when there is a reading to take, or no more to come."""
         self.unseen_since = inf
         """When the first reading came that was not taken."""
-        self.error: BaseException | None = None
-        self.has_ended = False
-        self._newest: Reading | None = None
-        self._leave = leave
-        self._dropped = dropped
 
     def put(self, reading: Reading) -> None:
         """Let *reading* be the newest."""
-        if self._newest is not None:
-            self.skipped += 1
-        self._newest = reading
+        super().put(reading)
         self.unseen_since = min(self.unseen_since, reading.at)
-        self.news.set()
 
     def take(self) -> Reading | None:
         """Return the newest reading, unless it was taken before."""
-        reading, self._newest = self._newest, None
         self.unseen_since = inf
-        return reading
-
-    def end(self, error: BaseException | None = None) -> None:
-        """Let the consumer finish, or raise *error*, when it has seen the newest reading."""
-        if not self.has_ended:
-            self.has_ended = True
-            self.error = error
-            self.news.set()
-
-    def close(self) -> None:
-        """Watch no longer: iterating ends, and the drive is not asked on this one's behalf. Harmless when repeated."""
-        self.end()
-        self.take()
-        self.error = None
-        self._leave()
-
-    def __aiter__(self) -> Watch:
-        return self
-
-    async def __anext__(self) -> Reading:
-        while (reading := self.take()) is None:
-            if self.error is not None:
-                raise self.error
-            if self.has_ended:
-                raise StopAsyncIteration
-            self.news.clear()
-            try:
-                await self.news.wait()
-            except asyncio.CancelledError:
-                del self  # whoever keeps the cancelled task, and its traceback, does not go on watching
-                raise
-        return reading
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self.close()
-
-    def __del__(self) -> None:
-        if not self.has_ended:
-            self._dropped()
+        return super().take()
 
 
 class GroupWatch(AsyncIterator[GroupReading]):
@@ -194,7 +136,7 @@ class GroupWatch(AsyncIterator[GroupReading]):
             except TimeoutError:
                 pass
             except asyncio.CancelledError:
-                del self  # as in Watch
+                del self  # as in NewestReadings
                 raise
 
     def _take(self) -> GroupReading:

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Mapping
-from contextlib import suppress
-from copy import copy
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from itertools import count
 from types import MappingProxyType, TracebackType
 from typing import Any, Final, Self
-from weakref import WeakSet, WeakValueDictionary
+from weakref import WeakSet
 
 from ..checked_numbers import check_number
 from ..errors import AnswerTimeoutError, CompaxError, ConnectionLostError, InvalidCommandError
 from ..escaping import shown
+from ..motion.watching import NewestReadings, Watchers
 from .answers import Request
 from .collecting import Collecting, value_of
 
@@ -67,7 +65,7 @@ class Reading:
         return quantity in self.values
 
 
-class Watch(AsyncIterator[Reading]):
+class Watch(NewestReadings[Reading]):
     """
     The readings of one control from now on, the newest only; made by :meth:`Control.watch`.
 
@@ -80,30 +78,20 @@ class Watch(AsyncIterator[Reading]):
         skipped: Readings that this consumer was too slow to see.
     """
 
-    has_ended = True  # until it is made
-
     def __init__(
         self,
         quantities: Mapping[Quantity, Request],
         interval_s: float,
-        *,
-        only_changes: bool,
         leave: Callable[[], None],
         dropped: Callable[[], None],
+        *,
+        only_changes: bool,
     ) -> None:
+        super().__init__(interval_s, leave, dropped)
         self.quantities = tuple(quantities)
-        self.interval_s = interval_s
-        self.skipped = 0
         self.requests = quantities
-        self.due_at = asyncio.get_running_loop().time()
-        self.error: BaseException | None = None
-        self.has_ended = False
         self._only_changes = only_changes
         self._said: tuple[dict[Quantity, Any], dict[Quantity, str]] | None = None
-        self._newest: Reading | None = None
-        self._news = asyncio.Event()
-        self._leave = leave
-        self._dropped = dropped
 
     def put(self, reading: Reading) -> None:
         """Let *reading* be the newest, unless it says the same as the last one and only changes are wanted."""
@@ -111,48 +99,7 @@ class Watch(AsyncIterator[Reading]):
         if self._only_changes and said == self._said:
             return
         self._said = said
-        self.skipped += self._newest is not None
-        self._newest = reading
-        self._news.set()
-
-    def end(self, error: BaseException | None = None) -> None:
-        """Let the consumer finish, or raise *error*, when it has seen the newest reading."""
-        if not self.has_ended:
-            self.has_ended = True
-            self.error = error
-            self._news.set()
-
-    def close(self) -> None:
-        """Watch no longer: iterating ends, and the control is not asked on this one's behalf. Harmless if repeated."""
-        self.end()
-        self._newest = self.error = None
-        self._leave()
-
-    def __aiter__(self) -> Watch:
-        return self
-
-    async def __anext__(self) -> Reading:
-        while self._newest is None:
-            if self.error is not None:
-                raise self.error
-            if self.has_ended:
-                raise StopAsyncIteration
-            self._news.clear()
-            try:
-                await self._news.wait()
-            except asyncio.CancelledError:
-                del self  # whoever keeps the cancelled task, and its traceback, does not go on watching
-                raise
-        reading, self._newest = self._newest, None
-        return reading
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self.close()
+        super().put(reading)
 
     async def __aenter__(self) -> Self:
         return self
@@ -161,10 +108,6 @@ class Watch(AsyncIterator[Reading]):
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         self.close()
-
-    def __del__(self) -> None:
-        if not self.has_ended:
-            self._dropped()
 
 
 class Watching:
@@ -183,16 +126,8 @@ class Watching:
         self._name = collecting.line.name
         self._cycle_s = collecting.line.settings.cycle_s
         self._loop = asyncio.get_running_loop()
-        self._watches: WeakValueDictionary[int, Watch] = WeakValueDictionary()
-        self._numbers = count()
-        self._task: asyncio.Task[None] | None = None
-        self._is_asking = False
-        self._joined = asyncio.Event()
+        self._watchers: Watchers[Watch] = Watchers(self._name, collecting.line.link, self._poll)
         self._next_cycle_at = self._loop.time()
-        self._is_over = False
-        self._lost: ConnectionLostError | None = None
-
-    # Joining and leaving --------------------------------------------------------------------------------------------
 
     def watch(self, quantities: tuple[Quantity, ...], interval_s: float | None, *, only_changes: bool) -> Watch:
         """Let somebody watch from now on; see :meth:`Control.watch`."""
@@ -209,89 +144,22 @@ class Watching:
                 hint="controls that were polled without pause have frozen",
             )
         requests = dict(map(_parsed, quantities))
-        number = next(self._numbers)
-        watch = Watch(
-            requests,
-            interval_s,
-            only_changes=only_changes,
-            leave=partial(self._leave, number),
-            dropped=self._dropped,
-        )
-        if self._is_over:
-            watch.end(self._loss())
-            return watch
-        self._watches[number] = watch
-        self._joined.set()
-        if self._task is None:
-            self._task = self._loop.create_task(self._poll(), name=f"{self._name}: watch")
-        return watch
+        return self._watchers.join(partial(Watch, requests, interval_s, only_changes=only_changes))
 
     def end(self, error: ConnectionLostError | None = None) -> None:
         """Let all who watch finish, and those to come; or raise *error* in them."""
-        self._lost = error
-        self._is_over = True
-        for watch in list(self._watches.values()):
-            watch.end(self._loss())
-        self._look_after()
-
-    def _loss(self) -> ConnectionLostError | None:
-        """Make an error of its own for each consumer: they are raised at different places."""
-        if self._lost is None:
-            return None
-        error = copy(self._lost)
-        error.__cause__ = self._lost.__cause__
-        return error
-
-    def _leave(self, number: int) -> None:
-        self._watches.pop(number, None)
-        self._look_after()
-
-    def _dropped(self) -> None:
-        # Whichever thread collects garbage; and the event loop may have ended long ago.
-        with suppress(RuntimeError):
-            self._loop.call_soon_threadsafe(self._look_after)
-
-    def _look_after(self) -> None:
-        """End the task if nobody watches any more; a question that is under way is carried through first."""
-        if self._task is not None and not self._is_asking and not self._watched:
-            task, self._task = self._task, None
-            task.cancel()
-
-    @property
-    def _watched(self) -> list[Watch]:
-        return [watch for watch in list(self._watches.values()) if not watch.has_ended]
+        self._watchers.end(error)
 
     # Polling --------------------------------------------------------------------------------------------------------
 
     async def _poll(self) -> None:
-        try:
-            while self._watched:
-                await self._collecting.pacing.until_free()
-                due_at = max(self._next_cycle_at, min((watch.due_at for watch in self._watched), default=0.0))
-                if due_at > self._loop.time():
-                    await self._wait_until(due_at)
-                else:
-                    await self._cycle()
-        except CompaxError:
-            # The line is over, whatever the last question failed by: the control tells all who watch, or has done so.
-            if not self._collecting.line.link.is_over:
-                raise
-        except BaseException as error:
-            # A defect, or somebody who cancels every task there is: nobody shall wait for ever.
-            if self._task is asyncio.current_task():
-                for watch in self._watched:
-                    watch.end(error if isinstance(error, Exception) else None)
-            raise
-        finally:
-            if self._task is asyncio.current_task():
-                self._task = None
-
-    async def _wait_until(self, due_at: float) -> None:
-        """Wait until *due_at*, or until somebody joins."""
-        self._joined.clear()
-        with suppress(TimeoutError):
-            async with asyncio.timeout_at(due_at):
-                await self._joined.wait()
+        while self._watchers.is_anybody_there:
+            await self._collecting.pacing.until_free()
+            due_at = max(self._next_cycle_at, min((watch.due_at for watch in self._watchers), default=0.0))
+            if due_at > self._loop.time():
+                await self._watchers.wait_until(due_at)
+            else:
+                await self._cycle()
 
     async def _cycle(self) -> None:
         """Ask for all who are due, once each, and give them their readings."""
@@ -299,13 +167,13 @@ class Watching:
         self._next_cycle_at = now + self._cycle_s
         due, requests = self._take_due(now)
         values, errors = await self._answers(requests)
-        for watch in list(due):
-            if not watch.has_ended:
+        for watch in self._watchers:
+            if watch in due:
                 watch.put(self._reading(watch, now, values, errors))
 
     def _take_due(self, now: float) -> tuple[WeakSet[Watch], dict[Quantity, Request]]:
         """Return whose readings are due, without holding them, and what is to be asked for them."""
-        due = [watch for watch in self._watched if watch.due_at <= now + _SAME_TIME_S]
+        due = [watch for watch in self._watchers if watch.due_at <= now + _SAME_TIME_S]
         requests: dict[Quantity, Request] = {}
         for watch in due:
             watch.due_at = now + watch.interval_s
@@ -318,7 +186,7 @@ class Watching:
         values: dict[Quantity, Any] = {}
         errors: dict[Quantity, CompaxError] = {}
         silence: AnswerTimeoutError | None = None
-        self._is_asking = True
+        self._watchers.is_asking = True
         try:
             for key, request in requests.items():
                 if silence is not None and self._collecting.pacing.is_silent:
@@ -332,7 +200,7 @@ class Watching:
                     errors[key] = error.with_traceback(None)
                     silence = error if isinstance(error, AnswerTimeoutError) else silence
         finally:
-            self._is_asking = False
+            self._watchers.is_asking = False
         return values, errors
 
     def _reading(
