@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import inf
-from typing import Protocol
+from typing import Generic, Protocol, TypeVar
 
 from compax_aio.haas.facts.characters import DC1, DC2, DC3, DC4, NUL, SPACE
 from compax_aio.haas.facts.port_settings import Synchronization
@@ -18,6 +18,7 @@ from .trouble import Trouble
 __all__ = ["Feeding", "Operation", "Port", "StreamReceiving", "StreamSending", "begin_reading", "send_code"]
 
 _LEADER_BYTES = 60
+_Sink = TypeVar("_Sink", bound=Sink)
 _CODES = {"DC1": DC1, "DC2": DC2, "DC3": DC3, "DC4": DC4}
 
 
@@ -144,26 +145,23 @@ class StreamSending:
         self._port.transmitter.abort(now)
 
 
-class StreamReceiving:
+class _StreamTaking(Generic[_Sink]):
     """
-    Receives a file as bytes, between DC1 and DC3 where Setting 14 has it.
+    Takes a file as bytes up to its end, between DC1 and DC3 where Setting 14 has it.
 
     Args:
         port: Of the control.
-        what: For people.
+        name: For people.
         sink: Where it goes.
     """
 
-    buffers = True
-    can_fill = False
     signs = b"%"
     needs = 64
 
-    def __init__(self, port: Port, what: str, sink: Sink) -> None:
-        self.name = f"receiving {what}"
+    def __init__(self, port: Port, name: str, sink: _Sink) -> None:
+        self.name = name
         self._port = port
         self._sink = sink
-        self._heard_at = inf
 
     @property
     def is_full(self) -> bool:
@@ -177,6 +175,40 @@ class StreamReceiving:
     def begin(self, now: float) -> None:
         """Turn the reader on."""
         begin_reading(self._port, now)
+
+    def _reader_off(self, now: float) -> None:
+        if self._port.around.knobs.mode is Synchronization.DC_CODES:
+            send_code(self._port, "DC3", now)
+
+    def _stop(self, now: float) -> None:
+        self._sink.abort(now)
+        self._port.over("RS232 ABORT", now)
+
+    def abort(self, now: float) -> None:
+        """Take no more; the sink keeps or drops what has come."""
+        self._sink.abort(now)
+
+
+class StreamReceiving(_StreamTaking[Sink]):
+    """
+    Receives a file as bytes, and stores it.
+
+    Args:
+        port: Of the control.
+        what: For people.
+        sink: Where it goes.
+    """
+
+    buffers = True
+    can_fill = False
+
+    def __init__(self, port: Port, what: str, sink: Sink) -> None:
+        super().__init__(port, f"receiving {what}", sink)
+        self._heard_at = inf
+
+    def begin(self, now: float) -> None:
+        """Turn the reader on, and listen from now on."""
+        super().begin(now)
         self._heard_at = now
 
     def feed(self, data: bytes, at: float, step_s: float) -> int:
@@ -187,8 +219,7 @@ class StreamReceiving:
         taken = sink.feed(data, at, step_s)
         self._heard_at = at + max(0, taken - 1) * step_s
         if sink.must_stop:
-            sink.abort(self._heard_at)
-            self._port.over("RS232 ABORT", self._heard_at)
+            self._stop(self._heard_at)
         elif self._has_ended() and knobs.end_of_receive == "percent":
             self._done(self._heard_at)
         elif self._has_ended() and taken < len(data):
@@ -225,60 +256,38 @@ class StreamReceiving:
             self._done(now)
         else:
             self._port.around.alarm("unexpected-end", at=now)
-            self._sink.abort(now)
-            self._port.over("RS232 ABORT", now)
+            self._stop(now)
 
     def _done(self, now: float) -> None:
         self._sink.end(now)
-        if self._port.around.knobs.mode is Synchronization.DC_CODES:
-            send_code(self._port, "DC3", now)
+        self._reader_off(now)
         self._port.over("RS232 ABORT" if self._sink.must_stop else "RS232 DONE", now)
 
-    def abort(self, now: float) -> None:
-        """Keep what has come, as the knob has it."""
-        self._sink.abort(now)
 
-
-class Feeding:
+class Feeding(_StreamTaking[DncSink]):
     """
-    Executes what comes (DNC), between DC1 and DC3 where Setting 14 has it.
+    Executes what comes (DNC).
 
     Args:
         port: Of the control.
         sink: Executes blocks.
     """
 
-    name = "dnc"
     buffers = can_fill = True
-    signs = b"%"
-    needs = 64
 
     def __init__(self, port: Port, sink: DncSink) -> None:
-        self._port = port
-        self._sink = sink
-
-    @property
-    def is_full(self) -> bool:
-        """Whether enough is read ahead."""
-        return self._sink.is_full
-
-    def _has_ended(self) -> bool:
-        """Whether the last % has come."""
-        return self._sink.tape.is_ended
-
-    def begin(self, now: float) -> None:
-        """Turn the reader on."""
-        begin_reading(self._port, now)
+        super().__init__(port, "dnc", sink)
 
     def feed(self, data: bytes, at: float, step_s: float) -> int:
         """Hand on what there is room for; behind the last % nothing is taken."""
         if self._has_ended():
             return len(data)
         taken = self._sink.feed(data, at, step_s)
-        if self._has_ended() and self._port.around.knobs.mode is Synchronization.DC_CODES:
-            send_code(self._port, "DC3", at + max(0, taken - 1) * step_s)
+        last_at = at + max(0, taken - 1) * step_s
+        if self._has_ended():
+            self._reader_off(last_at)
         if self._sink.must_stop:
-            self._stop(at + max(0, taken - 1) * step_s)
+            self._stop(last_at)
         return taken
 
     def next_at(self) -> float:
@@ -295,11 +304,3 @@ class Feeding:
             self._stop(now)
         elif self._sink.is_idle and self.next_at() <= now:
             self._port.over("RS232 DONE", now)
-
-    def _stop(self, now: float) -> None:
-        self._sink.abort(now)
-        self._port.over("RS232 ABORT", now)
-
-    def abort(self, now: float) -> None:
-        """Execute no more."""
-        self._sink.abort(now)
