@@ -23,7 +23,7 @@ from compax_aio.simulator.smc import Knobs as SmcKnobs
 from compax_aio.simulator.smc import LogKind as SmcLogKind
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-APPLICATIONS = {"commissioning", "fastapi_service", "from_pyserial", "scan_loop"}
+APPLICATIONS = {"commissioning", "fastapi_service", "from_pyserial", "haas_nightly_backup", "scan_loop"}
 """Whole applications; the others are sketches."""
 NAMES = sorted(path.stem for path in EXAMPLES.glob("*.py"))
 
