@@ -8,6 +8,7 @@ from math import inf, log
 from random import Random
 from typing import Final, Literal
 
+from ..trouble import Chance, ReplyTrouble
 from .knobs import Knobs
 
 __all__ = ["ByteFault", "Trouble"]
@@ -41,7 +42,7 @@ class _Distance:
             self.left -= count
 
 
-class Trouble:
+class Trouble(ReplyTrouble):
     """
     What goes wrong, and when.
 
@@ -50,10 +51,7 @@ class Trouble:
         note: Called with what was done, in words.
 
     Attributes:
-        replies_to_lose: So many answers of data collection are not sent.
-        replies_to_garble: So many get another character somewhere.
-        replies_to_double: So many come twice.
-        replies_to_delay_s: By how much each of the next ones is late.
+        replies_to_double: So many answers of data collection come twice.
         foreign_replies: Texts of answers to another host that come in front of the next ones.
         xons_to_lose: So many Xon are not sent.
         xoffs_to_lose: So many Xoff are not sent.
@@ -65,19 +63,16 @@ class Trouble:
 
     def __init__(self, knobs: Knobs, note: Callable[[str], None]) -> None:
         self._knobs = knobs
-        self._note = note
-        self._chance = Random(knobs.seed)
         self._parity = _Distance(knobs.parity_fault, Random(f"{knobs.seed} parity"))
         self._framing = _Distance(knobs.framing_fault, Random(f"{knobs.seed} framing"))
         self._spoilt = _Distance(knobs.spoil_sent, Random(f"{knobs.seed} spoilt"))
-        self.end()
+        super().__init__(knobs, Chance(knobs.seed), note, "answer")
 
     def end(self) -> None:
         """Forget what was asked for."""
-        self.replies_to_lose = self.replies_to_garble = self.replies_to_double = 0
-        self.xons_to_lose = self.xoffs_to_lose = 0
+        super().end()
+        self.replies_to_double = self.xons_to_lose = self.xoffs_to_lose = 0
         self.blocks_to_refuse = self.blocks_to_spoil = self.acks_to_lose = 0
-        self.replies_to_delay_s: deque[float] = deque()
         self.foreign_replies: deque[str] = deque()
         self.codes_to_lose: set[str] = set()
         self._asked: list[tuple[int, ByteFault]] = []
@@ -136,10 +131,10 @@ class Trouble:
         """Whether this sign is lost: ``Xon``, ``Xoff``, ``ACK``, ``DC1`` ..."""
         match sign:
             case "Xon":
-                is_lost = self.xons_to_lose > 0 or self._happens(self._knobs.lose_xon)
+                is_lost = self.xons_to_lose > 0 or self._chance.happens(self._knobs.lose_xon)
                 self.xons_to_lose = max(0, self.xons_to_lose - 1)
             case "Xoff":
-                is_lost = self.xoffs_to_lose > 0 or self._happens(self._knobs.lose_xoff)
+                is_lost = self.xoffs_to_lose > 0 or self._chance.happens(self._knobs.lose_xoff)
                 self.xoffs_to_lose = max(0, self.xoffs_to_lose - 1)
             case "ACK" | "NAK":
                 is_lost = self.acks_to_lose > 0
@@ -153,7 +148,7 @@ class Trouble:
 
     def refuses_block(self) -> bool:
         """Whether a good block is refused."""
-        if self.blocks_to_refuse <= 0 and not self._happens(self._knobs.refuse_block):
+        if self.blocks_to_refuse <= 0 and not self._chance.happens(self._knobs.refuse_block):
             return False
         self.blocks_to_refuse = max(0, self.blocks_to_refuse - 1)
         return True
@@ -171,7 +166,7 @@ class Trouble:
         """Return the answer to another host that comes in front; empty: none does."""
         if self.foreign_replies:
             text = self.foreign_replies.popleft()
-        elif self._happens(self._knobs.foreign_reply):
+        elif self._chance.happens(self._knobs.foreign_reply):
             text = "USING TOOL, 9"
         else:
             return ""
@@ -180,29 +175,12 @@ class Trouble:
 
     def reply(self, text: str) -> tuple[tuple[str, ...], float]:
         """Return what becomes of an answer: none, one or two, and by how much it is late."""
-        if self.replies_to_lose > 0 or self._happens(self._knobs.lose_reply):
-            self.replies_to_lose = max(0, self.replies_to_lose - 1)
-            self._note(f"answer {text} lost")
+        if self._loses_reply(text):
             return (), 0.0
-        if self.replies_to_garble > 0 or self._happens(self._knobs.garble_reply):
-            self.replies_to_garble = max(0, self.replies_to_garble - 1)
-            at = self._chance.randrange(len(text))
-            other = text[:at] + chr(ord(text[at]) ^ 1 << self._chance.randrange(7)) + text[at + 1 :]
-            self._note(f"answer {text} became {other!r}")
-            text = other
+        text = self._garbled_reply(text)
         texts: tuple[str, ...] = (text,)
-        if self.replies_to_double > 0 or self._happens(self._knobs.double_reply):
+        if self.replies_to_double > 0 or self._chance.happens(self._knobs.double_reply):
             self.replies_to_double = max(0, self.replies_to_double - 1)
             self._note(f"answer {text} doubled")
             texts = (text, text)
-        late_s = 0.0
-        if self.replies_to_delay_s:
-            late_s = self.replies_to_delay_s.popleft()
-        elif self._happens(self._knobs.late_reply):
-            late_s = self._knobs.late_s
-        if late_s:
-            self._note(f"answer {text} {late_s:g} s late")
-        return texts, late_s
-
-    def _happens(self, probability: float) -> bool:
-        return probability > 0 and self._chance.random() < probability
+        return texts, self._reply_late_s(text)

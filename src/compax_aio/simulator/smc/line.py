@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections import deque
 from collections.abc import Mapping
-from random import Random
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -13,6 +12,7 @@ from compax_aio.smc.facts import Mode
 
 from ..served_device import ServedDevice
 from ..state_file import load_state_file
+from ..trouble import Chance
 from .agenda import Agenda
 from .axis import SimulatedAxis
 from .controller import Controller
@@ -59,7 +59,7 @@ class SimulatedPartyLine(ServedDevice):
         self.knobs = knobs or Knobs()
         self.log = Log(log_entries)
         self._agenda = Agenda()
-        self._chance = Random(self.knobs.seed)
+        self._chance = Chance(self.knobs.seed)
         self._trouble = Trouble(self._agenda, self.knobs, self.log, self._chance)
         own = axis_knobs or {}
         self._controllers = {

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict, deque
-from random import Random
 
+from ..trouble import Chance
 from .agenda import Agenda
 from .knobs import Knobs
 from .log import Log, LogKind
@@ -24,7 +24,7 @@ class Trouble:
         answers_to_delay_s: By how much the next answers of each axis are late.
     """
 
-    def __init__(self, agenda: Agenda, knobs: Knobs, log: Log, chance: Random) -> None:
+    def __init__(self, agenda: Agenda, knobs: Knobs, log: Log, chance: Chance) -> None:
         self._agenda = agenda
         self._knobs = knobs
         self._log = log
@@ -55,16 +55,16 @@ class Trouble:
 
     def arriving(self, byte: int) -> int | None:
         """Return what a character of the host is when it arrives; None: it does not."""
-        if self._happens(self._knobs.stick):
+        if self._chance.happens(self._knobs.stick):
             self.stick(self._knobs.stick_s)
-        if self.characters_to_lose > 0 or self._happens(self._knobs.lose_character):
+        if self.characters_to_lose > 0 or self._chance.happens(self._knobs.lose_character):
             self.characters_to_lose = max(0, self.characters_to_lose - 1)
             self._note("", f"{byte:02X} lost")
             return None
         bit: int | None = None
         if self.bits_to_flip:
             bit = self.bits_to_flip.popleft()
-        elif self._happens(self._knobs.flip_bit):
+        elif self._chance.happens(self._knobs.flip_bit):
             bit = self._chance.randrange(8)
         if bit is None:
             return byte
@@ -73,7 +73,7 @@ class Trouble:
 
     def noise(self) -> int | None:
         """Return a character that comes out of nothing; None: there is none."""
-        if not self._happens(self._knobs.noise):
+        if not self._chance.happens(self._knobs.noise):
             return None
         byte = self._chance.randrange(256)
         self._note("", f"noise {byte:02X}")
@@ -81,10 +81,10 @@ class Trouble:
 
     def echo(self, letter: str, byte: int) -> int | None:
         """Return what an axis sends as the echo of a character; None: nothing."""
-        if self._is_next(self.echoes_to_lose, letter) or self._happens(self._knobs.lose_echo):
+        if self._is_next(self.echoes_to_lose, letter) or self._chance.happens(self._knobs.lose_echo):
             self._note(letter, f"echo {byte:02X} lost")
             return None
-        if self._is_next(self.echoes_to_garble, letter) or self._happens(self._knobs.garble_echo):
+        if self._is_next(self.echoes_to_garble, letter) or self._chance.happens(self._knobs.garble_echo):
             other = byte ^ self._chance.randrange(1, 256)
             self._note(letter, f"echo {byte:02X} became {other:02X}")
             return other
@@ -95,7 +95,7 @@ class Trouble:
         delays = self.answers_to_delay_s[letter]
         if delays:
             delay_s = delays.popleft()
-        elif self._happens(self._knobs.late_answer):
+        elif self._chance.happens(self._knobs.late_answer):
             delay_s = self._knobs.late_s
         else:
             return 0.0
@@ -104,14 +104,11 @@ class Trouble:
 
     def resets(self) -> bool:
         """Whether an axis resets itself now."""
-        return self._happens(self._knobs.spontaneous_reset)
+        return self._chance.happens(self._knobs.spontaneous_reset)
 
     def jogs(self) -> bool:
         """Whether somebody moves an axis now."""
-        return self._happens(self._knobs.jog)
-
-    def _happens(self, probability: float) -> bool:
-        return probability > 0 and self._chance.random() < probability
+        return self._chance.happens(self._knobs.jog)
 
     @staticmethod
     def _is_next(counts: Counter[str], letter: str) -> bool:
