@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from types import TracebackType
-from typing import Self
 
 from ..errors import (
     ConnectionLostError,
@@ -13,19 +11,15 @@ from ..errors import (
     MoveInDoubtError,
 )
 from ..escaping import shown
-from ..link.cancellation import despite_cancellation
 from ..link.contract import Event, Lane
-from ..link.link import LinkStats
-from ..link.reconnecting import Restored
 from ..motion.events import (
-    ConnectionLost,
-    ConnectionRestored,
     DriveEvent,
     EventHub,
     EventStream,
     Stopped,
     UnexpectedText,
 )
+from ..motion.open_device import OpenDevice
 from .aborting import Aborting
 from .checking import Sheet
 from .cut import AnyHandshake, Cut, OnCancel, check_manner
@@ -48,7 +42,7 @@ __all__ = ["Cutter"]
 _log = logging.getLogger("compax_aio.camm1")
 
 
-class Cutter:
+class Cutter(OpenDevice[CutterLine]):
     """
     One cutter, open; made by :func:`compax_aio.camm1.connect`.
 
@@ -67,10 +61,10 @@ class Cutter:
             profile,
             settings,
             on_event=self._on_event,
-            on_lost=self._on_lost,
+            on_lost=self._on_down,
             greet=self._meet,
             on_down=self._on_down,
-            on_restored=self._on_restored,
+            on_restored=self._tell_restored,
         )
         self._greeting = Greeting(self._line)
         self._reports = CutReports(self._line)
@@ -314,16 +308,6 @@ class Cutter:
         """What is known of this line."""
         return self._line.settings
 
-    @property
-    def stats(self) -> LinkStats:
-        """Counters of the line."""
-        return self._line.link.stats
-
-    @property
-    def is_open(self) -> bool:
-        """Whether the line is there; not while it is lost and tried again."""
-        return self._line.link.is_open
-
     async def close(self) -> None:
         """
         Abort the job under way, or wait for it (``on_cancel="finish"``), and close the line; harmless when repeated.
@@ -333,23 +317,11 @@ class Cutter:
         Raises:
             CompaxError: The machine may not have stopped.
         """
-        await despite_cancellation(self._close())
+        await super().close()
 
-    async def _close(self) -> None:
-        try:
-            if (cutting := self._cutting) is not None and not cutting.task.done():
-                await cutting.end()
-        finally:
-            await self._line.link.close()
-            self._events.end()
-
-    async def __aenter__(self) -> Self:
-        return self
-
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        await self.close()
+    async def _end(self) -> None:
+        if (cutting := self._cutting) is not None and not cutting.task.done():
+            await cutting.end()
 
     async def _open(self, url: str) -> None:
         await self._line.open(url)
@@ -377,12 +349,6 @@ class Cutter:
             self._events.publish(UnexpectedText(self.name, now, event.text))
 
     def _on_down(self, error: ConnectionLostError) -> None:
-        self._events.publish(ConnectionLost(self.name, self._loop.time(), str(error)))
+        self._tell_lost(error)
         if self._cutting is not None:
             self._cutting.note_lost(error)
-
-    def _on_restored(self, restored: Restored) -> None:
-        self._events.publish(ConnectionRestored(self.name, self._loop.time(), restored.after_s, restored.attempts, ()))
-
-    def _on_lost(self, error: ConnectionLostError) -> None:
-        self._on_down(error)

@@ -6,20 +6,16 @@ import asyncio
 import logging
 from collections.abc import Iterable
 from functools import cached_property
-from types import TracebackType
-from typing import Self, Unpack
+from typing import Unpack
 
 from ..errors import ConnectionLostError, InvalidCommandError
-from ..link.cancellation import despite_cancellation
 from ..link.contract import Event
-from ..link.link import LinkStats
 from ..link.reconnecting import Restored
+from ..motion.open_device import OpenDevice
 from .axis import AxisCommands
 from .codecs import DriveStatus, SerialInterface
 from .events import (
     ComparatorPassed,
-    ConnectionLost,
-    ConnectionRestored,
     EventHub,
     EventStream,
     Fault,
@@ -54,7 +50,7 @@ __all__ = ["Drive"]
 _log = logging.getLogger("compax_aio.compax")
 
 
-class Drive(Readings, AxisCommands, Parts):
+class Drive(Readings, AxisCommands, Parts, OpenDevice[DriveLine]):
     """
     One COMPAX drive on an open line; made by :func:`compax_aio.connect`.
 
@@ -306,16 +302,6 @@ class Drive(Readings, AxisCommands, Parts):
         """What P20 says of errors, handshake and binary; None where it could not be read, or was written since."""
         return self._line.transfer.interface
 
-    @property
-    def stats(self) -> LinkStats:
-        """Counters of the line."""
-        return self._line.link.stats
-
-    @property
-    def is_open(self) -> bool:
-        """Whether the line is there, and known to lead to this drive; not while it is lost and tried again."""
-        return self._line.link.is_open
-
     async def close(self) -> None:
         """
         Stop what was started here, and close the line; harmless when repeated.
@@ -325,9 +311,9 @@ class Drive(Readings, AxisCommands, Parts):
         Raises:
             AnswerTimeoutError, CommandRejectedError, MoveTimeoutError: The axis may not have stopped.
         """
-        await despite_cancellation(self._close())
+        await super().close()
 
-    async def _close(self) -> None:
+    async def _end(self) -> None:
         try:
             if not self._line.link.is_over:
                 await self._motion.end()
@@ -336,17 +322,7 @@ class Drive(Readings, AxisCommands, Parts):
                 raise
             # Else whoever awaited the move has been told.
         finally:
-            await self._line.link.close()
-            self._events.end()
             self._poller.end()
-
-    async def __aenter__(self) -> Self:
-        return self
-
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        await self.close()
 
     # What the line tells --------------------------------------------------------------------------------------------
 
@@ -376,7 +352,7 @@ class Drive(Readings, AxisCommands, Parts):
         self._events.publish(Fault(self.name, self._loop.time(), error))
 
     def _on_down(self, error: ConnectionLostError) -> None:
-        self._events.publish(ConnectionLost(self.name, self._loop.time(), str(error)))
+        self._tell_lost(error)
         self._motion.line_lost(error)
 
     def _on_restored(self, restored: Restored) -> None:
@@ -388,12 +364,10 @@ class Drive(Readings, AxisCommands, Parts):
                 self.name,
                 " and ".join(signs),
             )
-        self._events.publish(
-            ConnectionRestored(self.name, self._loop.time(), restored.after_s, restored.attempts, signs)
-        )
+        self._tell_restored(restored, signs)
         self._motion.line_restored(signs)
 
     def _on_lost(self, error: ConnectionLostError) -> None:
-        self._events.publish(ConnectionLost(self.name, self._loop.time(), str(error)))
+        self._tell_lost(error)
         self._poller.end(error)
         self._motion.line_lost(error)

@@ -7,19 +7,16 @@ import logging
 import os
 from collections.abc import Callable, Iterable
 from functools import partial
-from types import TracebackType
-from typing import Self, Unpack
+from typing import Unpack
 
 from ..errors import ConnectionLostError, InvalidCommandError
 from ..escaping import shown
-from ..link.cancellation import despite_cancellation
 from ..link.contract import Event
-from ..link.link import LinkStats
-from ..link.reconnecting import Restored
 from ..motion.events import EventHub, EventStream
+from ..motion.open_device import OpenDevice
 from .asking import Asking
 from .collecting import Collecting
-from .events import ConnectionLost, ConnectionRestored, Overheard, Printed, ReaderOff, ReaderOn
+from .events import Overheard, Printed, ReaderOff, ReaderOn
 from .facts.data_files import DataKind
 from .language.program_file import ProgramFile
 from .line import ControlLine
@@ -45,7 +42,7 @@ __all__ = ["Control"]
 _log = logging.getLogger("compax_aio.haas")
 
 
-class Control(Asking):
+class Control(Asking, OpenDevice[ControlLine]):
     """
     One control, open; made by :func:`compax_aio.haas.connect`.
 
@@ -69,8 +66,8 @@ class Control(Asking):
             on_event=self._on_event,
             on_lost=self._on_lost,
             greet=self._meet,
-            on_down=self._on_down,
-            on_restored=self._on_restored,
+            on_down=self._tell_lost,
+            on_restored=self._tell_restored,
         )
         self._reports = TransferReports(name, self.profile, self._line.link)
         self._transferring: Transferring[Received] | Transferring[Sent] | None = None
@@ -338,40 +335,20 @@ class Control(Asking):
         """How long things may take on this line."""
         return self._line.settings
 
-    @property
-    def stats(self) -> LinkStats:
-        """Counters of the line."""
-        return self._line.link.stats
-
-    @property
-    def is_open(self) -> bool:
-        """Whether the line is there; not while it is lost and tried again."""
-        return self._line.link.is_open
-
     async def close(self) -> None:
         """
         Cancel the transfer under way, and close the line; harmless when repeated.
 
         It is carried through even if the caller is cancelled meanwhile.
         """
-        await despite_cancellation(self._close())
+        await super().close()
 
-    async def _close(self) -> None:
+    async def _end(self) -> None:
         try:
             if self._transferring is not None and not self._transferring.task.done():
                 await self._transferring.end()
         finally:
             self._watching.end()
-            await self._line.link.close()
-            self._events.end()
-
-    async def __aenter__(self) -> Self:
-        return self
-
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        await self.close()
 
     async def _open(self, url: str) -> None:
         await self._line.open(url)
@@ -401,11 +378,5 @@ class Control(Asking):
         return None if self._transferring is None else self._transferring.task
 
     def _on_lost(self, error: ConnectionLostError) -> None:
-        self._on_down(error)
+        self._tell_lost(error)
         self._watching.end(error)
-
-    def _on_down(self, error: ConnectionLostError) -> None:
-        self._events.publish(ConnectionLost(self.name, self._loop.time(), str(error)))
-
-    def _on_restored(self, restored: Restored) -> None:
-        self._events.publish(ConnectionRestored(self.name, self._loop.time(), restored.after_s, restored.attempts, ()))

@@ -6,15 +6,14 @@ import asyncio
 import logging
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from types import MappingProxyType, TracebackType
-from typing import Self
+from types import MappingProxyType
 
 from ..errors import CompaxError, ConnectionLostError, InvalidCommandError, UnexpectedAnswerError
 from ..link.cancellation import despite_cancellation
 from ..link.contract import Event, Lane
-from ..link.link import LinkStats
 from ..link.reconnecting import Restored
-from ..motion.events import ConnectionLost, ConnectionRestored, EventHub, EventStream, UnexpectedText
+from ..motion.events import EventHub, EventStream, UnexpectedText
+from ..motion.open_device import OpenDevice
 from .axis import SmcAxis
 from .events import AxesReset, CommandDamaged
 from .facts import ESCAPE, MAX_AXES, NO_NAME, POSSIBLE_NAMES, RESET, Mode
@@ -29,7 +28,7 @@ __all__ = ["PartyLine"]
 _log = logging.getLogger("compax_aio.smc")
 
 
-class PartyLine:
+class PartyLine(OpenDevice[SmcLine]):
     """
     One line with one or more axes, open; made by :func:`compax_aio.smc.connect`.
 
@@ -46,7 +45,7 @@ class PartyLine:
             mode,
             settings,
             on_event=self._on_event,
-            on_lost=self._on_lost,
+            on_lost=self._on_down,
             greet=self._greet,
             on_down=self._on_down,
             on_restored=self._on_restored,
@@ -233,16 +232,6 @@ class PartyLine:
         """How the axes take their commands."""
         return self._line.mode
 
-    @property
-    def stats(self) -> LinkStats:
-        """Counters of the line."""
-        return self._line.link.stats
-
-    @property
-    def is_open(self) -> bool:
-        """Whether the line is there; not while it is lost and tried again."""
-        return self._line.link.is_open
-
     async def close(self) -> None:
         """
         Stop what was started here, and close the line; harmless when repeated.
@@ -252,16 +241,12 @@ class PartyLine:
         Raises:
             CompaxError: An axis may not have stopped.
         """
-        await despite_cancellation(self._close())
+        await super().close()
 
-    async def _close(self) -> None:
-        try:
-            if not self._line.link.is_over:
-                outcomes = await asyncio.gather(*(axis.end() for axis in self._axes.values()), return_exceptions=True)
-                self._raise_unless_lost(outcomes)
-        finally:
-            await self._line.link.close()
-            self._events.end()
+    async def _end(self) -> None:
+        if not self._line.link.is_over:
+            outcomes = await asyncio.gather(*(axis.end() for axis in self._axes.values()), return_exceptions=True)
+            self._raise_unless_lost(outcomes)
 
     def _raise_unless_lost(self, outcomes: Iterable[object]) -> None:
         """Raise the first error; that the line was lost for good, whoever awaited a move has been told."""
@@ -269,14 +254,6 @@ class PartyLine:
             is_told = isinstance(outcome, ConnectionLostError) and self._line.link.is_over
             if isinstance(outcome, BaseException) and not is_told:
                 raise outcome
-
-    async def __aenter__(self) -> Self:
-        return self
-
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        await self.close()
 
     async def _open(self, url: str) -> None:
         await self._line.link.open(url)
@@ -370,19 +347,12 @@ class PartyLine:
         self._events.publish(AxesReset(self.name, self._loop.time(), "".join(self._axes), why))
 
     def _on_down(self, error: ConnectionLostError) -> None:
-        self._events.publish(ConnectionLost(self.name, self._loop.time(), str(error)))
+        self._tell_lost(error)
         for axis in self._axes.values():
             axis.line_lost()
 
     def _on_restored(self, restored: Restored) -> None:
         signs = tuple(f"{axis.name}: {axis.lost_reference}" for axis in self._axes.values() if axis.lost_reference)
-        self._events.publish(
-            ConnectionRestored(self.name, self._loop.time(), restored.after_s, restored.attempts, signs)
-        )
+        self._tell_restored(restored, signs)
         for axis in self._axes.values():
             axis.line_restored()
-
-    def _on_lost(self, error: ConnectionLostError) -> None:
-        self._events.publish(ConnectionLost(self.name, self._loop.time(), str(error)))
-        for axis in self._axes.values():
-            axis.line_lost()
