@@ -56,16 +56,7 @@ class Cutter(OpenDevice[CutterLine]):
         self.profile = profile
         self._events = EventHub()
         self._loop = asyncio.get_running_loop()
-        self._line = CutterLine(
-            name,
-            profile,
-            settings,
-            on_event=self._on_event,
-            on_lost=self._on_down,
-            greet=self._meet,
-            on_down=self._on_down,
-            on_restored=self._tell_restored,
-        )
+        self._line = CutterLine(name, profile, settings, **self._tells)
         self._greeting = Greeting(self._line)
         self._reports = CutReports(self._line)
         self._cutting: Cutting | None = None
@@ -328,7 +319,7 @@ class Cutter(OpenDevice[CutterLine]):
 
     # What the line tells --------------------------------------------------------------------------------------------
 
-    async def _meet(self) -> None:
+    async def _greet(self) -> None:
         await self._greeting.meet()
 
     def _publish(self, event: DriveEvent) -> None:
@@ -349,6 +340,6 @@ class Cutter(OpenDevice[CutterLine]):
             self._events.publish(UnexpectedText(self.name, now, event.text))
 
     def _on_down(self, error: ConnectionLostError) -> None:
-        self._tell_lost(error)
+        super()._on_down(error)
         if self._cutting is not None:
             self._cutting.note_lost(error)

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from contextlib import suppress
-from typing import Final, TypeVar
+from typing import Final, TypeVar, Unpack
 
-from ..errors import CommandRejectedError, CompaxError, ConnectionLostError, TransportError, UnexpectedAnswerError
+from ..errors import CommandRejectedError, CompaxError, TransportError, UnexpectedAnswerError
 from ..link.contract import Event, Lane, TurnOver
+from ..link.device_link import LineTells, device_link
 from ..link.level import LineLevel
-from ..link.link import Link
-from ..link.reconnecting import Reconnecting, Restored
 from ..link.taps import plain
 from ..transports.line_settings import LineSettings
 from ..transports.url import TransportURL
@@ -44,25 +43,10 @@ class CutterLine:
         name: Of the cutter.
         profile: Which machine it is.
         settings: How long things take.
-        on_event: Called with what comes unasked.
-        on_lost: Called when the line goes away for good.
-        greet: Looks who is on a line that was opened; see :class:`~compax_aio.link.link.Link`.
-        on_down: Called when the line goes away, and is tried again.
-        on_restored: Called when it is back.
+        tells: See :class:`~compax_aio.link.device_link.LineTells`.
     """
 
-    def __init__(
-        self,
-        name: str,
-        profile: Profile,
-        settings: CutterSettings,
-        *,
-        on_event: Callable[[Event], None],
-        on_lost: Callable[[ConnectionLostError], None],
-        greet: Callable[[], Awaitable[None]],
-        on_down: Callable[[ConnectionLostError], None],
-        on_restored: Callable[[Restored], None],
-    ) -> None:
+    def __init__(self, name: str, profile: Profile, settings: CutterSettings, **tells: Unpack[LineTells]) -> None:
         self.name = name
         self.profile = profile
         self.settings = settings
@@ -77,16 +61,13 @@ class CutterLine:
         self._error_text = encode(AskError(), profile).decode()
         self.abort_text = encode(AbortCutting(), profile).decode()
         self.protocol = CutterProtocol(settings, status_query=self._status_text, free_space_query=self._free_text)
-        self._on_event = on_event
-        self.link = Link(
+        self._on_event = tells["on_event"]
+        self.link = device_link(
             self.protocol,
-            name=name,
+            name,
+            settings,
+            {**tells, "on_event": self._take_event},
             answer_timeout_s=settings.answered_after_s,
-            resync_attempts=settings.resync_attempts,
-            on_event=self._take_event,
-            on_lost=on_lost,
-            greet=greet,
-            reconnecting=Reconnecting.by(settings, name, on_down, on_restored),
             advice_on_silence=(
                 "check power, cable (a PC needs a crossed one), port, baud rate and frame of the cutter; one that "
                 "holds its replies back wants RTS and DTR of the host at its CTS and DSR"

@@ -63,15 +63,7 @@ class Drive(Readings, AxisCommands, Parts, OpenDevice[DriveLine]):
         self.name = name
         self._events = EventHub()
         self._loop = asyncio.get_running_loop()
-        line = DriveLine(
-            name,
-            settings,
-            on_event=self._on_event,
-            on_lost=self._on_lost,
-            greet=self._greet,
-            on_down=self._on_down,
-            on_restored=self._on_restored,
-        )
+        line = DriveLine(name, settings, **self._tells)
         super().__init__(line, Observer(line, self._on_fault))
         self._motion = Motion(self._observer, self._events.publish)
         self._identity = Identity(self._observer, self._motion)
@@ -352,7 +344,7 @@ class Drive(Readings, AxisCommands, Parts, OpenDevice[DriveLine]):
         self._events.publish(Fault(self.name, self._loop.time(), error))
 
     def _on_down(self, error: ConnectionLostError) -> None:
-        self._tell_lost(error)
+        super()._on_down(error)
         self._motion.line_lost(error)
 
     def _on_restored(self, restored: Restored) -> None:
@@ -368,6 +360,5 @@ class Drive(Readings, AxisCommands, Parts, OpenDevice[DriveLine]):
         self._motion.line_restored(signs)
 
     def _on_lost(self, error: ConnectionLostError) -> None:
-        self._tell_lost(error)
+        super()._on_lost(error)
         self._poller.end(error)
-        self._motion.line_lost(error)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable, Coroutine
+from collections.abc import Callable, Coroutine
 from math import inf
-from typing import Any, TypeVar
+from typing import Any, TypeVar, Unpack
 
 from ..errors import AnswerTimeoutError, CommandRejectedError, ConnectionLostError, UnexpectedAnswerError
-from ..link.contract import Event, Lane, TurnOver
-from ..link.link import Link
-from ..link.reconnecting import Reconnecting, Restored
+from ..link.contract import Lane, TurnOver
+from ..link.device_link import LineTells, device_link
 from ..link.taps import plain
 from .codecs import DriveStatus, decode_number, shows_active
 from .facts.device_errors import device_error
@@ -30,38 +29,20 @@ class DriveLine:
     Args:
         name: Of the drive.
         settings: Time-outs and what is known of the drive's ways.
-        on_event: Called with messages and strays as they are read.
-        on_lost: Called when the line goes away for good.
-        greet: Looks who is on a line that was opened; see :class:`~compax_aio.link.link.Link`.
-        on_down: Called when the line goes away, and is tried again.
-        on_restored: Called when it is back.
+        tells: See :class:`~compax_aio.link.device_link.LineTells`.
     """
 
     __slots__ = ("active_seen_at", "last_position", "link", "name", "protocol", "settings", "transfer")
 
-    def __init__(
-        self,
-        name: str,
-        settings: DriveSettings,
-        *,
-        on_event: Callable[[Event], None],
-        on_lost: Callable[[ConnectionLostError], None],
-        greet: Callable[[], Awaitable[None]],
-        on_down: Callable[[ConnectionLostError], None],
-        on_restored: Callable[[Restored], None],
-    ) -> None:
+    def __init__(self, name: str, settings: DriveSettings, **tells: Unpack[LineTells]) -> None:
         self.name = name
         self.settings = settings
         self.protocol = CompaxProtocol(settings.message_form, error_pattern=settings.error_pattern)
-        self.link = Link(
+        self.link = device_link(
             self.protocol,
-            name=name,
-            answer_timeout_s=settings.answer_timeout_s,
-            resync_attempts=settings.resync_attempts,
-            on_event=on_event,
-            on_lost=on_lost,
-            greet=greet,
-            reconnecting=Reconnecting.by(settings, name, on_down, on_restored),
+            name,
+            settings,
+            tells,
             advice_on_silence=(
                 "check power, cable (crossed, not straight), port and baud rate, and the handshake lines; a device "
                 "that takes longer to answer wants more answer_timeout_s"

@@ -59,16 +59,7 @@ class Control(Asking, OpenDevice[ControlLine]):
         self.profile = profile_for(url, profile)
         self._loop = asyncio.get_running_loop()
         self._events = EventHub()
-        self._line = ControlLine(
-            name,
-            self.profile,
-            settings,
-            on_event=self._on_event,
-            on_lost=self._on_lost,
-            greet=self._meet,
-            on_down=self._tell_lost,
-            on_restored=self._tell_restored,
-        )
+        self._line = ControlLine(name, self.profile, settings, **self._tells)
         self._reports = TransferReports(name, self.profile, self._line.link)
         self._transferring: Transferring[Received] | Transferring[Sent] | None = None
         self._collecting = Collecting(self._line, self._transfer_task)
@@ -355,7 +346,7 @@ class Control(Asking, OpenDevice[ControlLine]):
 
     # What the line tells --------------------------------------------------------------------------------------------
 
-    async def _meet(self) -> None:
+    async def _greet(self) -> None:
         """Ask nothing: a control that collects no data answers nothing."""
 
     def _on_event(self, event: Event) -> None:
@@ -378,5 +369,5 @@ class Control(Asking, OpenDevice[ControlLine]):
         return None if self._transferring is None else self._transferring.task
 
     def _on_lost(self, error: ConnectionLostError) -> None:
-        self._tell_lost(error)
+        super()._on_lost(error)
         self._watching.end(error)

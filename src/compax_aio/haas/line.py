@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from contextlib import suppress
-from typing import Final
+from typing import Final, Unpack
 
 from ..errors import AnswerTimeoutError, CompaxError, ConnectionLostError, UnexpectedAnswerError
-from ..link.contract import Event, Lane
+from ..link.contract import Lane
+from ..link.device_link import LineTells, device_link
 from ..link.level import LineLevel
-from ..link.link import Link
-from ..link.reconnecting import Reconnecting, Restored
 from ..link.taps import plain
 from ..transports.line_errors import LineErrors, line_errors_of
 from .line_url import bytes_per_s, completed
@@ -45,28 +44,13 @@ class ControlLine:
         name: Of the control.
         profile: How it is set up.
         settings: How long things take.
-        on_event: Called with what comes unasked.
-        on_lost: Called when the line goes away for good.
-        greet: Awaited on every line that was opened; see :class:`~compax_aio.link.link.Link`.
-        on_down: Called when the line goes away, and is tried again.
-        on_restored: Called when it is back.
+        tells: See :class:`~compax_aio.link.device_link.LineTells`.
 
     Attributes:
         counted: What the port has counted during the last transfer; None: it does not count.
     """
 
-    def __init__(
-        self,
-        name: str,
-        profile: Profile,
-        settings: ControlSettings,
-        *,
-        on_event: Callable[[Event], None],
-        on_lost: Callable[[ConnectionLostError], None],
-        greet: Callable[[], Awaitable[None]],
-        on_down: Callable[[ConnectionLostError], None],
-        on_restored: Callable[[Restored], None],
-    ) -> None:
+    def __init__(self, name: str, profile: Profile, settings: ControlSettings, **tells: Unpack[LineTells]) -> None:
         self.name = name
         self.profile = profile
         self.settings = settings
@@ -74,15 +58,11 @@ class ControlLine:
         self._turn: Strategy | None = None
         """The transfer that is the turn of the line."""
         self.protocol = HaasProtocol(profile, settings)
-        self.link = Link(
+        self.link = device_link(
             self.protocol,
-            name=name,
-            answer_timeout_s=settings.answer_timeout_s,
-            resync_attempts=settings.resync_attempts,
-            on_event=on_event,
-            on_lost=on_lost,
-            greet=greet,
-            reconnecting=Reconnecting.by(settings, name, on_down, on_restored),
+            name,
+            settings,
+            tells,
             advice_on_silence=_ADVICE,
             about=lambda: {"device": "haas", "profile": plain(profile), "settings": plain(settings)},
         )

@@ -9,6 +9,8 @@ from typing import Generic, Protocol, Self, TypeVar
 
 from ..errors import ConnectionLostError
 from ..link.cancellation import despite_cancellation
+from ..link.contract import Event
+from ..link.device_link import LineTells
 from ..link.link import Link, LinkStats
 from ..link.reconnecting import Restored
 from .events import ConnectionLost, ConnectionRestored, EventHub
@@ -18,7 +20,8 @@ __all__ = ["OpenDevice"]
 
 class _Line(Protocol):
     @property
-    def link(self) -> Link: ...
+    def link(self) -> Link:
+        """What runs it."""
 
 
 _LineT = TypeVar("_LineT", bound=_Line)
@@ -65,10 +68,34 @@ class OpenDevice(ABC, Generic[_LineT]):
     ) -> None:
         await self.close()
 
-    # What happens to the line ---------------------------------------------------------------------------------------
+    # What the line tells --------------------------------------------------------------------------------------------
 
-    def _tell_lost(self, error: ConnectionLostError) -> None:
+    @property
+    def _tells(self) -> LineTells:
+        return {
+            "on_event": self._on_event,
+            "on_lost": self._on_lost,
+            "greet": self._greet,
+            "on_down": self._on_down,
+            "on_restored": self._on_restored,
+        }
+
+    @abstractmethod
+    def _on_event(self, event: Event) -> None:
+        """Take what comes unasked."""
+
+    @abstractmethod
+    async def _greet(self) -> None:
+        """Look who is on a line that was opened."""
+
+    def _on_lost(self, error: ConnectionLostError) -> None:
+        self._on_down(error)
+
+    def _on_down(self, error: ConnectionLostError) -> None:
         self._events.publish(ConnectionLost(self.name, self._loop.time(), str(error)))
+
+    def _on_restored(self, restored: Restored) -> None:
+        self._tell_restored(restored)
 
     def _tell_restored(self, restored: Restored, signs_of_restart: tuple[str, ...] = ()) -> None:
         now = self._loop.time()

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
-from typing import TypeVar
+from collections.abc import Callable
+from typing import TypeVar, Unpack
 
-from ..errors import AnswerTimeoutError, CommandRejectedError, CompaxError, ConnectionLostError, UnexpectedAnswerError
-from ..link.contract import Event, Lane, TurnOver
-from ..link.link import Link
-from ..link.reconnecting import Reconnecting, Restored
+from ..errors import AnswerTimeoutError, CommandRejectedError, CompaxError, UnexpectedAnswerError
+from ..link.contract import Lane, TurnOver
+from ..link.device_link import LineTells, device_link
 from ..link.taps import plain
 from .codecs import AxisStatus, decode_number, decode_status
 from .facts import ESCAPE, Mode, Reply, command_of
@@ -31,40 +30,21 @@ class SmcLine:
         name: Of the line.
         mode: How the axes take their commands.
         settings: How long things take, and which member of the family this is.
-        on_event: Called with what comes unasked.
-        on_lost: Called when the line goes away for good.
-        greet: Looks who is on a line that was opened; see :class:`~compax_aio.link.link.Link`.
-        on_down: Called when the line goes away, and is tried again.
-        on_restored: Called when it is back.
+        tells: See :class:`~compax_aio.link.device_link.LineTells`.
     """
 
-    def __init__(
-        self,
-        name: str,
-        mode: Mode,
-        settings: SmcSettings,
-        *,
-        on_event: Callable[[Event], None],
-        on_lost: Callable[[ConnectionLostError], None],
-        greet: Callable[[], Awaitable[None]],
-        on_down: Callable[[ConnectionLostError], None],
-        on_restored: Callable[[Restored], None],
-    ) -> None:
+    def __init__(self, name: str, mode: Mode, settings: SmcSettings, **tells: Unpack[LineTells]) -> None:
         self.name = name
         self.mode = mode
         self.settings = settings
         self.wrong_names = ""
         """Why nobody knows which controller of a chain has which name; empty: they have those that were dealt."""
         self.protocol = SmcProtocol(mode, settings)
-        self.link = Link(
+        self.link = device_link(
             self.protocol,
-            name=name,
-            answer_timeout_s=settings.answer_timeout_s,
-            resync_attempts=settings.resync_attempts,
-            on_event=on_event,
-            on_lost=on_lost,
-            greet=greet,
-            reconnecting=Reconnecting.by(settings, name, on_down, on_restored),
+            name,
+            settings,
+            tells,
             marker_timeout_s=settings.quiet_s + settings.echo_timeout_s,
             advice_on_silence=(
                 "check power, cable, port and baud rate, the mode that the axes were switched to, and their names; "

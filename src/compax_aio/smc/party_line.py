@@ -40,16 +40,7 @@ class PartyLine(OpenDevice[SmcLine]):
         self.name = name
         self._events = EventHub()
         self._loop = asyncio.get_running_loop()
-        self._line = SmcLine(
-            name,
-            mode,
-            settings,
-            on_event=self._on_event,
-            on_lost=self._on_down,
-            greet=self._greet,
-            on_down=self._on_down,
-            on_restored=self._on_restored,
-        )
+        self._line = SmcLine(name, mode, settings, **self._tells)
         self._axes: dict[str, SmcAxis] = {}
         self._was_open = False
         self._own_resets = 0
@@ -347,7 +338,7 @@ class PartyLine(OpenDevice[SmcLine]):
         self._events.publish(AxesReset(self.name, self._loop.time(), "".join(self._axes), why))
 
     def _on_down(self, error: ConnectionLostError) -> None:
-        self._tell_lost(error)
+        super()._on_down(error)
         for axis in self._axes.values():
             axis.line_lost()
 
