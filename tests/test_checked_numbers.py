@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.hostile.wicked import STRANGE_NUMBERS, NamedNumber, SmuggledFloat, SmuggledInt, refusal
 
-from compax_aio.checked_numbers import check_number, check_whole, written
+from compax_aio.checked_numbers import check_number, check_time, check_whole, written
 
 
 @pytest.mark.parametrize("value", STRANGE_NUMBERS, ids=range(len(STRANGE_NUMBERS)))
@@ -25,6 +25,14 @@ def test_a_strange_number_is_refused_or_becomes_a_plain_one(value: Any) -> None:
 def test_a_number_of_another_kind_is_its_value() -> None:
     assert [check_number("it", each) for each in (SmuggledFloat(3.5), NamedNumber.THIRD)] == [3.5, 3.0]
     assert type(check_whole("it", NamedNumber.THIRD, 0, 5)) is int
+
+
+def test_a_time_is_a_finite_number_of_seconds_above_0() -> None:
+    assert all(refusal(lambda each=each: check_time("it", each)) is None for each in (1, 0.001, 3600.0))  # type: ignore[misc]
+    for each in (0, -1, float("inf"), float("nan"), 10**400, True, "1", None):
+        said = refusal(lambda each=each: check_time("it", each))  # type: ignore[misc]
+        assert said is not None
+        assert said.startswith("it is a time above 0 in seconds, not ")
 
 
 def test_what_is_not_whole_or_out_of_range_is_refused() -> None:

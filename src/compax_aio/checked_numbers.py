@@ -5,11 +5,12 @@ from __future__ import annotations
 from decimal import Decimal
 from math import isfinite
 from numbers import Real
+from sys import float_info
 
 from .errors import InvalidCommandError
 from .escaping import shown
 
-__all__ = ["check_number", "check_whole", "written"]
+__all__ = ["check_number", "check_time", "check_whole", "written"]
 
 
 def check_number(what: str, value: object) -> float:
@@ -42,6 +43,17 @@ def check_whole(what: str, value: object, lowest: int, highest: int, *, source: 
         by = f" ({source})" if source else ""
         raise InvalidCommandError(f"{what} is a whole number from {lowest} to {highest}{by}, not {shown(value)}")
     return int(number)
+
+
+def check_time(what: str, value: object) -> None:
+    """
+    Do nothing if *value* can be waited for.
+
+    Raises:
+        InvalidCommandError: It is no finite number of seconds above 0; *what* names it.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value <= float_info.max:
+        raise InvalidCommandError(f"{what} is a time above 0 in seconds, not {shown(value)}")
 
 
 def written(number: float, decimals: int) -> str:

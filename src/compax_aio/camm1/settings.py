@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from math import isfinite
 from typing import Final
 
-from ..checked_numbers import check_whole
-from ..errors import InvalidCommandError
-from ..escaping import shown
+from ..checked_numbers import check_time, check_whole
 from .facts.instructions import MAX_BLOCK_SIZE, MAX_DELAY_MS
 
 __all__ = ["CutterSettings"]
@@ -77,11 +74,9 @@ class CutterSettings:
             name, value = field.name, getattr(self, field.name)
             if value is None and name in _MAY_BE_NONE:
                 continue
-            if name.endswith("_s") and not (
-                isinstance(value, (int, float)) and not isinstance(value, bool) and isfinite(value) and value > 0
-            ):
-                raise InvalidCommandError(f"{name} is a time above 0 in seconds, not {shown(value)}")
-            if name in _COUNTS:
+            if name.endswith("_s"):
+                check_time(name, value)
+            elif name in _COUNTS:
                 check_whole(name, value, 1, 1_000_000)
         check_whole("turnaround_ms", self.turnaround_ms, 0, MAX_DELAY_MS, source="PNC-1610 p. 28")
         if self.reserve_bytes is not None:

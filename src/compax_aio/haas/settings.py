@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from math import isfinite
 from typing import Final
 
-from ..checked_numbers import check_whole
+from ..checked_numbers import check_time, check_whole
 from ..errors import InvalidCommandError
 from ..escaping import shown
 
@@ -93,9 +93,9 @@ class ControlSettings:
             name, value = field.name, getattr(self, field.name)
             if value is None and name in _MAY_BE_NONE:
                 continue
-            if name.endswith("_s") and not _is_time(value):
-                raise InvalidCommandError(f"{name} is a time above 0 in seconds, not {shown(value)}")
-            if name in _COUNTS:
+            if name.endswith("_s"):
+                check_time(name, value)
+            elif name in _COUNTS:
                 check_whole(name, value, 1, 1_000_000)
             elif name in _SIZES:
                 check_whole(name, value, 1, 1 << 40)
@@ -125,7 +125,3 @@ class ControlSettings:
     def may_write(self, variable: int) -> bool:
         """Whether that variable is among the writable ones."""
         return any(variable in each for each in self.writable)
-
-
-def _is_time(value: object) -> bool:
-    return not isinstance(value, bool) and isinstance(value, int | float) and isfinite(value) and value > 0

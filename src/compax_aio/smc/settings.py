@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from math import isfinite
 from typing import Literal
 
+from ..checked_numbers import check_time
 from ..errors import InvalidCommandError
 from .profile import DCB_274, Profile
 
@@ -72,11 +72,8 @@ class SmcSettings:
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            value = getattr(self, field.name)
-            if field.name.endswith("_s") and not (
-                isinstance(value, (int, float)) and not isinstance(value, bool) and isfinite(value) and value > 0
-            ):
-                raise InvalidCommandError(f"{field.name} is a time above 0 in seconds, not {value!r}")
+            if field.name.endswith("_s"):
+                check_time(field.name, getattr(self, field.name))
         if self.cancel_with not in {"line feed", "escape"}:
             raise InvalidCommandError(f"cancel_with is 'line feed' or 'escape', not {self.cancel_with!r}")
         for name in ("resync_attempts", "reconnect_attempts"):
