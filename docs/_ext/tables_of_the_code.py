@@ -28,8 +28,11 @@ from compax_aio.compax.facts.settings import DIALECT_FACTS, SETTING_FACTS
 from compax_aio.compax.facts.status import S16_BITS, S17_BITS, STATUS_VALUES
 from compax_aio.compax.protocol import TRANSITIONS, State
 from compax_aio.compax.settings import Dialect, DriveSettings
+from compax_aio.haas.facts.alarms import ALARMS as CONTROL_ALARMS
+from compax_aio.haas.facts.queries import QUERIES
 from compax_aio.simulator.camm1 import Knobs as CutterKnobs
 from compax_aio.simulator.compax import Knobs
+from compax_aio.simulator.haas import Knobs as ControlKnobs
 from compax_aio.simulator.smc import Knobs as SmcKnobs
 from compax_aio.smc.facts import COMMANDS, Reply
 from compax_aio.smc.profile import PROFILES, Profile
@@ -364,6 +367,29 @@ def _shown(value: Any) -> str:
     return getattr(value, "name", None) or (str(value) if isinstance(value, str | int) else f"{type(value).__name__}()")
 
 
+def _control_alarms() -> Table:
+    head = ("number", "text", "meaning", "what to do", "existence")
+    rows = []
+    for each in CONTROL_ALARMS.values():
+        heard = "" if each.heard_as is None else f" (often told as {each.heard_as})"
+        number = f"not known{heard}" if each.number is None else str(each.number)
+        rows.append((number, _code(each.text), each.meaning, each.remedy, each.certainty.value))
+    return head, rows
+
+
+def _questions() -> Table:
+    head = ("question", "meaning", "classic answer", "answer over Ethernet")
+    return head, [
+        (
+            _code(f"{each.command} n" if each.takes_variable else each.command),
+            each.meaning,
+            _code(each.classic_example),
+            _code(each.ethernet_example),
+        )
+        for each in QUERIES.values()
+    ]
+
+
 # Sphinx
 
 
@@ -403,6 +429,9 @@ def setup(app: Sphinx) -> dict[str, bool]:
         ("table-of-smc-settings", _smc_settings),
         ("table-of-smc-knobs", partial(_knobs, SmcKnobs)),
         ("table-of-camm1-knobs", partial(_knobs, CutterKnobs)),
+        ("table-of-haas-knobs", partial(_knobs, ControlKnobs)),
+        ("table-of-haas-alarms", _control_alarms),
+        ("table-of-haas-questions", _questions),
         ("table-of-profiles", _profiles),
     )
     for name, make in tables:

@@ -12,10 +12,11 @@ import pytest
 
 from compax_aio.camm1.facts.instructions import CONTROL_INSTRUCTIONS
 from compax_aio.camm1.facts.mnemonics import COMMON, MODE_1, MODE_2
+from compax_aio.haas.facts.queries import QUERIES
 from compax_aio.smc.facts import COMMANDS
 
 ROOT = Path(__file__).parents[2]
-PAGES = {"coverage.md": 200, "smc-coverage.md": 55, "camm1-coverage.md": 90}
+PAGES = {"coverage.md": 200, "smc-coverage.md": 55, "camm1-coverage.md": 90, "haas-coverage.md": 80}
 """How many rows each has at least."""
 HEAD = ["subject", "client", "simulator", "tests"]
 
@@ -104,3 +105,9 @@ def test_every_known_instruction_of_cutters_has_a_row() -> None:
     subjects = " ".join(cells[0] for _, cells in rows("camm1-coverage.md"))
     named = set(re.findall(r"`([^`]+)`", subjects))
     assert {*MODE_1, *MODE_2, *COMMON, *(f".{letter}" for letter in CONTROL_INSTRUCTIONS)} <= named
+
+
+def test_every_known_question_to_a_control_has_a_row() -> None:
+    subjects = " ".join(cells[0] for _, cells in rows("haas-coverage.md"))
+    named = set(re.findall(r"`([^`]+)`", subjects))
+    assert QUERIES.keys() <= named
