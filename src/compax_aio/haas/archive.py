@@ -1,29 +1,39 @@
 """
 What comes from a control, kept in a file while it comes: as ``*.incomplete`` until it is whole, then under its name.
 
-Everything that touches the disk runs in a thread, one thing after the other. A file that is there is replaced at the
-end, or left as it is; one that was left incomplete by an earlier transfer is never overwritten.
+Everything that touches the disk runs in a thread, one thing after the other, and is carried through although whoever
+waits for it is cancelled. A file that is there is replaced at the end, or left as it is; one that was left incomplete
+by an earlier transfer is never overwritten.
 """
 
 from __future__ import annotations
 
 import asyncio
+import errno
+import logging
 import os
 from collections.abc import Callable
 from contextlib import suppress
 from datetime import datetime
+from functools import partial
 from pathlib import Path
-from typing import BinaryIO, Final
+from typing import Any, BinaryIO, Final, TypeVar
 
 from ..errors import InvalidCommandError
-from ..escaping import shown
+from ..escaping import escaped, shown
 from ..text_file import expect_file
 
 __all__ = ["Archive"]
 
+_log = logging.getLogger("compax_aio.haas")
+
+_ResultT = TypeVar("_ResultT")
+
 _PIECE_BYTES: Final = 4096
 """So much is collected before it is written …"""
 _MOST_NAMES: Final = 1000
+_LONGEST_S: Final = 30.0
+"""A disk that takes longer, as one in a network that is gone, is not waited for."""
 
 
 class Archive:
@@ -53,10 +63,12 @@ class Archive:
         self._when = ""
         self._pending = bytearray()
         self._written = 0
-        self._working: asyncio.Task[None] | None = None
-        self._failure: OSError | None = None
+        self._working: asyncio.Future[Any] | None = None
+        """What a thread is at, or was last."""
         self.place: Path | None = None
         """Where the file is now; None before it is opened."""
+        self.failure: OSError | None = None
+        """Why not all that came is in the file; None: it is, or will be."""
 
     # In the event loop ----------------------------------------------------------------------------------------------
 
@@ -68,14 +80,13 @@ class Archive:
             InvalidCommandError: *path* can be no name, or there is no such folder.
             OSError: It cannot be made.
         """
-        self._working = asyncio.get_running_loop().create_task(asyncio.to_thread(self._open))
-        await asyncio.shield(self._working)  # whoever is cancelled meanwhile finds it at the end
+        await self._do(self._open)
 
     def write(self, data: bytes) -> None:
         """Have *data* written soon."""
         self._pending += data
         if len(self._pending) >= _PIECE_BYTES and (self._working is None or self._working.done()):
-            self._working = asyncio.get_running_loop().create_task(self._flush())
+            self._begin(self._append_or_fail, self._take_pending())
 
     async def finish(self, size: int, name: str | None = None) -> Path:
         """
@@ -88,38 +99,55 @@ class Archive:
         Raises:
             OSError: It could not be written; what could is in the incomplete file.
         """
-        await self._flush_all()
-        if self._failure is not None:
-            raise self._failure
-        self.place = await asyncio.to_thread(self._finish, size, name)
-        return self.place
+        await self._do(self._append_or_fail, takes_pending=True)
+        if self.failure is not None:
+            raise self.failure
+        return await self._do(self._finish, size, name)
 
     async def leave(self) -> Path | None:
-        """Have what came on the disk, as incomplete; return where it is, or None if there is no file."""
-        await self._flush_all()
-        with suppress(OSError):
-            await asyncio.to_thread(self._close)
+        """
+        Have what came on the disk, as incomplete; one that has its name already keeps it.
+
+        Returns:
+            Where it is, or None if there is no file. Whether all of it is there, :attr:`failure` says.
+
+        Raises:
+            TimeoutError: The disk does nothing.
+        """
+        await self._do(self._leave, takes_pending=True)
         return self.place
 
     async def discard(self) -> None:
-        """Leave no file: nothing came."""
-        await self._flush_all()
-        await asyncio.to_thread(self._discard)
-        self.place = None
+        """
+        Leave no file: nothing came.
 
-    async def _flush_all(self) -> None:
-        while self._working is not None and not self._working.done():
-            await asyncio.wait([self._working])
-        if self._file is not None:
-            await self._flush()
+        Raises:
+            TimeoutError: The disk does nothing.
+        """
+        await self._do(self._discard)
 
-    async def _flush(self) -> None:
+    def _take_pending(self) -> bytes:
         data, self._pending = bytes(self._pending), bytearray()
-        if data and self._failure is None:
-            try:
-                await asyncio.to_thread(self._append, data)
-            except OSError as error:  # told at the end: what comes is in memory as well
-                self._failure = error
+        return data
+
+    async def _do(self, work: Callable[..., _ResultT], *args: object, takes_pending: bool = False) -> _ResultT:
+        """Have *work* done when what is under way is done; it goes on although who waits is cancelled meanwhile."""
+        try:
+            async with asyncio.timeout(_LONGEST_S):
+                while self._working is not None and not self._working.done():
+                    await asyncio.wait([self._working])
+                if takes_pending:
+                    args = (self._take_pending(), *args)
+                return await asyncio.shield(self._begin(work, *args))
+        except TimeoutError:
+            why = f"The disk has done nothing for {_LONGEST_S:g} s"
+            error = TimeoutError(errno.ETIMEDOUT, why, str(self.place or self._path))
+            self.failure = self.failure or error
+            raise error from None
+
+    def _begin(self, work: Callable[..., _ResultT], *args: object) -> asyncio.Future[_ResultT]:
+        self._working = working = asyncio.get_running_loop().run_in_executor(None, partial(work, *args))
+        return working
 
     # In a thread ----------------------------------------------------------------------------------------------------
 
@@ -148,6 +176,16 @@ class Archive:
                 return
         raise InvalidCommandError(f"there are {_MOST_NAMES - 1} incomplete files beside {shown(str(path))}")
 
+    def _append_or_fail(self, data: bytes) -> None:
+        """Write *data*; that it fails is told at the end, for it is in memory as well."""
+        if not data or self.failure is not None or self._file is None:
+            return
+        try:
+            self._append(data)
+        except OSError as error:
+            self.failure = error
+            _log.warning("what comes is not kept in %s any more: %s", escaped(str(self.place)), error)
+
     def _append(self, data: bytes) -> None:
         assert self._file is not None
         rest = memoryview(data)
@@ -174,8 +212,16 @@ class Archive:
             self.place.replace(target)
         else:
             target = self._place_in_folder(self._folder, name or self._kind)
+        self.place = target
         _sync_folder(target.parent)
         return target
+
+    def _leave(self, data: bytes) -> None:
+        self._append_or_fail(data)
+        try:
+            self._close()
+        except OSError as error:
+            self.failure = self.failure or error
 
     def _place_in_folder(self, folder: Path, name: str) -> Path:
         """Give the file a name that nothing in the folder has."""
@@ -201,6 +247,7 @@ class Archive:
         if self.place is not None:
             with suppress(OSError):
                 self.place.unlink()
+            self.place = None
 
 
 def _sync_folder(folder: Path) -> None:

@@ -54,12 +54,20 @@ class Receiving(Transferring[Received]):
         archive = None if manner.archive is None else Archive(manner.archive, kind)
         super().__init__(line, kind, "receive", manner, publish=publish, after=after)
         self._archive = archive
+        self._file_data = bytearray()
+        """What has come, the first time."""
         self._accepts_damage = manner.accept_damaged
 
     async def _carry_out(self) -> Received:
         if self._archive is not None:
-            await self._archive.open()
-        data, on_line = await self._receive(self._archive)
+            try:
+                await self._archive.open()
+            except InvalidCommandError as error:
+                error.device = self._line.name
+                raise
+            except OSError as error:
+                raise self._reports.no_archive(error, self.account()) from error
+        data, on_line = await self._receive()
         self._on_line = on_line
         damage = self._damage_of(on_line)
         self._refuse_damage(damage, on_line)
@@ -71,6 +79,7 @@ class Receiving(Transferring[Received]):
                 place = await self._archive.finish(len(data), name_of_file(file))
             except OSError as error:
                 raise self._reports.unwritten(error, data, self.account()) from error
+        self._file_data.clear()
         return Received(
             control=self._line.name,
             kind=self.kind,
@@ -84,8 +93,12 @@ class Receiving(Transferring[Received]):
             warnings=warnings,
         )
 
-    async def _receive(self, archive: Archive | None, why: str = "") -> tuple[bytes, LineAccount]:
-        data = bytearray()
+    def _came(self) -> bytes:
+        return bytes(self._file_data)
+
+    async def _receive(self, why: str = "") -> tuple[bytes, LineAccount]:
+        data = bytearray() if self._is_verifying else self._file_data
+        archive = None if self._is_verifying else self._archive
 
         def take(piece: bytes) -> None:
             data.extend(piece)
@@ -121,7 +134,7 @@ class Receiving(Transferring[Received]):
 
     async def _verify(self, file: ProgramFile | DataFile) -> Verified:
         self._is_verifying = True
-        data, on_line = await self._receive(None, _AGAIN)
+        data, on_line = await self._receive(_AGAIN)
         self._refuse_damage(self._damage_of(on_line), on_line)
         again, _ = await self._read(data)
         verified = verified_received(file.payload, again.payload)

@@ -13,7 +13,6 @@ from ..errors import (
     InvalidCommandError,
     UnexpectedAnswerError,
 )
-from ..escaping import escaped
 from ..link.link import Link
 from .profiles import Profile
 from .transfer import Damage, Kind, TransferAccount
@@ -83,11 +82,10 @@ def operator_text(kind: Kind, *, sends: bool) -> str:
 
 
 def with_account(error: _Error, account: TransferAccount) -> _Error:
-    """Have *error* tell what is known of the transfer: as ``error.transfer``, and in notes."""
+    """Have *error* tell what is known of the transfer: as ``error.transfer``, and in a note; the newest is told."""
+    if not hasattr(error, "transfer"):
+        error.add_note(f"transfer: {account}")
     error.transfer = account  # type: ignore[attr-defined]  # part of what a control's errors carry
-    error.add_note(f"transfer: {account}")
-    if account.archive is not None:
-        error.add_note(f"what came is in {escaped(str(account.archive))}")
     return error
 
 
@@ -171,6 +169,28 @@ class TransferReports:
     def unequal(self, what: str, account: TransferAccount, hint: str) -> UnexpectedAnswerError:
         """Report a file that is another one at the second look."""
         return self._of(UnexpectedAnswerError, what, account, hint)
+
+    def no_archive(self, cause: OSError, account: TransferAccount) -> InvalidCommandError:
+        """Report a transfer that was not begun because what comes could not be kept."""
+        error = self._of(
+            InvalidCommandError,
+            f"the archive cannot be written: {cause}",
+            account,
+            "nothing is listened for; name a file or a folder that you may write to",
+        )
+        error.__cause__ = cause
+        return error
+
+    def unreadable(self, cause: OSError, account: TransferAccount) -> InvalidCommandError:
+        """Report a transfer that was not begun because the file that is to be sent cannot be read."""
+        error = self._of(
+            InvalidCommandError,
+            f"what is to be sent cannot be read: {cause}",
+            account,
+            "nothing was sent; is it there?",
+        )
+        error.__cause__ = cause
+        return error
 
     def unwritten(self, cause: OSError, data: bytes, account: TransferAccount) -> InvalidCommandError:
         """Report a file that came, and could not be kept."""

@@ -55,6 +55,8 @@ class Sending(Transferring[Sent]):
         except InvalidCommandError as error:
             error.device = self._line.name
             raise with_account(error, self.account()) from None
+        except OSError as error:
+            raise self._reports.unreadable(error, self.account()) from error
         self._total_bytes = len(prepared.data)
         strategy = self._line.sender(f"send {self.kind}", prepared.data, self._patience, kind=self.kind)
         answer = self._ask_operator(sends=True)

@@ -16,6 +16,7 @@ from ..errors import (
     ConnectionLostError,
     InvalidCommandError,
 )
+from ..escaping import escaped
 from ..link.cancellation import despite_cancellation
 from ..link.contract import Event
 from ..motion.events import DriveEvent, MoveOutcome
@@ -103,6 +104,10 @@ class Transferring(ABC, Generic[_ResultT]):
     @abstractmethod
     async def _carry_out(self) -> _ResultT:
         """Do it, and return the result."""
+
+    def _came(self) -> bytes:
+        """Return what has come until now; of what is sent, nothing does."""
+        return b""
 
     # What the caller's future asks ----------------------------------------------------------------------------------
 
@@ -213,10 +218,7 @@ class Transferring(ABC, Generic[_ResultT]):
             self.transfer.note_cancelled()  # it may be this task that was cancelled, by a loop that ends
         except CompaxError as error:
             failure = error
-        except OSError as error:  # of the archive, or of the file that shall be sent
-            failure = InvalidCommandError(str(error), device=self._line.name, hint="nothing is under way")
-            failure.__cause__ = error
-        except Exception as error:  # a defect here: whoever awaits it learns of it, and the line is let go of
+        except Exception as error:  # of the caller's, or a defect: who awaits it learns of it, the line is let go of
             self.transfer.fail(error)
         finally:
             await despite_cancellation(self._end(result, failure))
@@ -234,10 +236,9 @@ class Transferring(ABC, Generic[_ResultT]):
             await self._leave_archive(self._archive)
         account = self.account()
         self._is_over = True
-        if failure is not None and not hasattr(failure, "transfer"):
-            with_account(failure, account)
-        elif failure is not None:
-            failure.transfer = account  # its archive is where it stays now
+        if failure is not None:
+            with_account(failure, account)  # again, for its archive is where it stays now
+            self._tell_place(failure, account)
         self._tell(result, failure, account)
         if result is not None:
             self.transfer.finish(result)
@@ -255,6 +256,17 @@ class Transferring(ABC, Generic[_ResultT]):
                 await archive.leave()
         except OSError as error:
             _log.warning("%s: the incomplete archive could not be closed: %s", self._line.name, error)
+
+    def _tell_place(self, failure: CompaxError, account: TransferAccount) -> None:
+        """Have *failure* tell where the bytes are."""
+        if account.archive is None or self._archive is None:
+            return
+        where = escaped(str(account.archive))
+        if (cause := self._archive.failure) is None:
+            failure.add_note(f"what came is in {where}")
+        else:
+            failure.data = self._came()  # type: ignore[attr-defined]
+            failure.add_note(f"not all that came is in {where} ({cause}): error.data has it")
 
     def _tell(self, result: _ResultT | None, failure: CompaxError | None, account: TransferAccount) -> None:
         outcome: MoveOutcome = "reached"
