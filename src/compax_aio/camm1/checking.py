@@ -9,6 +9,7 @@ from enum import Enum
 from typing import Final
 
 from ..errors import InvalidCommandError
+from ..problems import MOST_OF_A_KIND, Problem, refuse_errors
 from ..severity import Severity
 from .facts.line import DC1, DC3, ENQ, ESCAPE, ETX, MAX_COORDINATE
 from .facts.mnemonics import Mnemonic, Shape, mnemonic_of
@@ -21,28 +22,6 @@ from .language.tracking import Path, Tracker
 from .profiles import PNC_1610, Profile
 
 __all__ = ["MOST_OF_A_KIND", "Checker", "Problem", "Sheet", "check", "raise_for_errors"]
-
-MOST_OF_A_KIND: Final = 20
-"""So many of one kind are told one by one; the others are counted."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Problem:
-    """One finding."""
-
-    line: int
-    """From 1."""
-    column: int
-    """From 1, in bytes."""
-    offset: int
-    """Of a byte of the job, from 0."""
-    severity: Severity
-    what: str
-    hint: str
-
-    def __str__(self) -> str:
-        """Write ``line 3, column 7: error: …; …``."""
-        return f"line {self.line}, column {self.column}: {self.severity.value}: {self.what}; {self.hint}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -382,7 +361,4 @@ def raise_for_errors(problems: Iterable[Problem]) -> None:
     Raises:
         InvalidCommandError: With all of the errors in its text, one a line.
     """
-    errors = [str(problem) for problem in problems if problem.severity is Severity.ERROR]
-    if errors:
-        count = "1 error" if len(errors) == 1 else f"{len(errors)} errors"
-        raise InvalidCommandError("\n".join((f"{count} in the job:", *errors)))
+    refuse_errors(problems, "the job")

@@ -6,39 +6,28 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from enum import Enum
 from itertools import islice
-from typing import Final, TypeVar
+from typing import TypeVar
 
-from ..errors import InvalidCommandError
+from ..problems import MOST_OF_A_KIND, refuse_errors
+from ..problems import Problem as AnyProblem
 from ..severity import Severity
 from .facts.alarms import Alarm
 from .language.lines import Lines
 
 __all__ = ["MOST_OF_A_KIND", "Finding", "Kind", "Problem", "raise_for_errors", "some", "told"]
 
-MOST_OF_A_KIND: Final = 20
-"""So many of one kind are told one by one; the others are counted."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Problem:
+class Problem(AnyProblem):
     """One finding."""
 
-    line: int
-    """From 1."""
-    column: int
-    """From 1, in bytes."""
-    offset: int
-    """Of a byte of the file, from 0."""
-    severity: Severity
-    what: str
-    hint: str
     alarm: Alarm | None = None
     """What the control is known to raise for it."""
 
     def __str__(self) -> str:
         """Write ``line 3, column 7: error: …; …``."""
         raised = f" (the control would raise {self.alarm})" if self.alarm is not None else ""
-        return f"line {self.line}, column {self.column}: {self.severity.value}: {self.what}; {self.hint}{raised}"
+        return f"{AnyProblem.__str__(self)}{raised}"
 
 
 class Kind(Enum):
@@ -120,7 +109,4 @@ def raise_for_errors(problems: Iterable[Problem]) -> None:
     Raises:
         InvalidCommandError: With all of the errors in its text, one a line.
     """
-    errors = [str(problem) for problem in problems if problem.severity is Severity.ERROR]
-    if errors:
-        count = "1 error" if len(errors) == 1 else f"{len(errors)} errors"
-        raise InvalidCommandError("\n".join((f"{count} in the file:", *errors)))
+    refuse_errors(problems, "the file")

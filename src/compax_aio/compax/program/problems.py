@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from ...errors import InvalidCommandError
+from ...problems import refuse_errors
 from ...severity import Severity
 
 __all__ = ["Problem", "Severity", "raise_for_errors"]
@@ -35,7 +35,4 @@ def raise_for_errors(problems: Iterable[Problem]) -> None:
     Raises:
         InvalidCommandError: With all of the errors in its text, one a line.
     """
-    errors = [str(problem) for problem in problems if problem.severity is Severity.ERROR]
-    if errors:
-        count = "1 error" if len(errors) == 1 else f"{len(errors)} errors"
-        raise InvalidCommandError("\n".join((f"{count} in the program:", *errors)))
+    refuse_errors(problems, "the program")
