@@ -61,7 +61,7 @@ def check_program(
     lines = Lines(file.data, file.eob)
     begin, end = lines.offsets[lines.first], lines.offsets[lines.behind]
     body = file.data[begin:end]
-    masked = _COMMENT.sub(_blank, body)
+    masked = _without_comments(body)
     findings = [
         *_about_frame(lines),
         *_about_signs(body, begin),
@@ -85,13 +85,16 @@ _EIGHT_BITS: Final = re.compile(rb"[\x80-\xff]+")
 _CONTROL: Final = re.compile(rb"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
 _LOWER_CASE: Final = re.compile(rb"[a-z]+")
 _LONG: Final = re.compile(rb"[^\r\n]{%d,}" % (LONG_BLOCK_BYTES + 1))
-_NEAR: Final = 64
-"""So many bytes beside a % are looked at: no leader is longer within a line."""
+_WITH_PERCENT: Final = re.compile(rb"(?<![^\r\n])[^\r\n%]*%[^\r\n]*")
 _LINE_NUMBER: Final = re.compile(rb"(?<![A-Z0-9#.\[])N[ \t]*0*([1-9][0-9]{5,})")
 
 
-def _blank(match: re.Match[bytes]) -> bytes:
-    return b" " * len(match[0])
+def _without_comments(body: bytes) -> bytes:
+    """Put blanks in their place; here and not by sub(), which keeps each piece for itself until the end."""
+    masked = bytearray(body)
+    for match in _COMMENT.finditer(body):
+        masked[match.start() : match.end()] = b" " * len(match[0])
+    return bytes(masked)
 
 
 def _about_frame(lines: Lines) -> Iterator[Finding]:
@@ -150,14 +153,13 @@ def _about_semicolons(body: bytes, begin: int, severity: Severity) -> Iterator[F
 
 def _about_percents(body: bytes, masked: bytes, begin: int) -> Iterator[Finding]:
     """Look for ``%`` that is not alone in its line: what a control makes of it is not known."""
-    within = [at for at in _places_of(b"%", body) if not _is_alone(body, at)]
     hint = "the control may take it for the end of the data; take it out, or put it alone in the last line"
     yield from some(
-        (at for at in within if masked[at] == PERCENT),
+        (at for at in _percents_within(body) if masked[at] == PERCENT),
         _at(Kind.PERCENT, Severity.ERROR, "a % within a block", hint, begin),
     )
     yield from some(
-        (at for at in within if masked[at] != PERCENT),
+        (at for at in _percents_within(body) if masked[at] != PERCENT),
         _at(Kind.PERCENT_IN_COMMENT, Severity.WARNING, "a % within a comment", hint, begin),
     )
 
@@ -169,10 +171,10 @@ def _places_of(what: bytes, body: bytes) -> Iterator[int]:
         at = body.find(what, at + 1)
 
 
-def _is_alone(body: bytes, at: int) -> bool:
-    before = body[max(0, at - _NEAR) : at].rstrip(SKIPPED)
-    behind = body[at + 1 : at + 1 + _NEAR].lstrip(SKIPPED)
-    return (not before or before[-1] in LINE_ENDS) and (not behind or behind[0] in LINE_ENDS)
+def _percents_within(body: bytes) -> Iterator[int]:
+    for line in _WITH_PERCENT.finditer(body):
+        if line[0].strip(SKIPPED) != b"%":
+            yield from (line.start() + at for at in _places_of(b"%", line[0]))
 
 
 def _about_words(masked: bytes, body: bytes, begin: int) -> Iterator[Finding]:

@@ -251,6 +251,8 @@ def _programs_by_occurrence(file: ProgramFile) -> dict[tuple[str | int, int], Pr
 
 
 def _first_in(before: Program | None, after: Program | None) -> ProgramDifference | None:
+    if before is not None and after is not None and bytes(before) == bytes(after):
+        return None
     for one, other in zip_longest(_blocks_of(before), _blocks_of(after)):
         if one is not None and other is not None and (one.raw == other.raw or _bare(one) == _bare(other)):
             continue
@@ -267,13 +269,9 @@ def _first_in(before: Program | None, after: Program | None) -> ProgramDifferenc
     return None
 
 
-def _blocks_of(program: Program | None) -> tuple[Block, ...]:
+def _blocks_of(program: Program | None) -> Iterable[Block]:
     """Leave out blank blocks at the end: a control has one in front of the last ``%``."""
-    blocks = () if program is None else program.blocks
-    end = len(blocks)
-    while end and blocks[end - 1].is_blank:
-        end -= 1
-    return blocks[:end]
+    return () if program is None else program.blocks.without_blank_end()
 
 
 def _bare(block: Block) -> bytes:

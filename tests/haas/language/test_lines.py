@@ -43,7 +43,7 @@ def test_what_is_told_of_the_pattern_decides_where_the_file_leaves_it_open() -> 
 
 def test_with_doubled_ends_any_other_end_ends_a_line_as_well() -> None:
     lines = Lines(b"A\n\nB\nC\n\nD", "lf lf")
-    assert lines.raw == [b"A\n\n", b"B\n", b"C\n\n", b"D"]
+    assert list(lines.raw) == [b"A\n\n", b"B\n", b"C\n\n", b"D"]
 
 
 @given(ANY_FILE, st.sampled_from([None, *EobPattern]))

@@ -22,6 +22,8 @@ _VALUE: Final = rb"((?:[+-][ \t]*)?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+))"
 _LINE: Final = re.compile(_IN_FRONT + rb"N[ \t]*([0-9]{1,9})[ \t]*V[ \t]*" + _VALUE + _IN_FRONT)
 _WHOLE_VALUE: Final = re.compile(r"(?:[+-][ \t]*)?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)")
 _BLANKS: Final = b" \t"
+_MOST_DATA: Final = 1_000_000
+"""Macro variables, of which there are most, are some ten thousand."""
 
 _PARTS: Final = (
     (re.compile(_IN_FRONT + rb"N"), "invalid-n-code", "a line of data begins with N"),
@@ -231,10 +233,21 @@ def kind_of_data(kind: DataKind | str) -> DataKind:
 
 
 def lines_of_data(lines: Lines) -> Iterator[DataLine | int]:
-    """Give the lines between the ``%`` lines: as data, or as the index of one that is none; blank ones are left out."""
+    """
+    Give the lines between the ``%`` lines: as data, or as the index of one that is none; blank ones are left out.
+
+    Raises:
+        InvalidCommandError: There are more of them than any control has data.
+    """
+    count = 0
     for at in range(lines.first, lines.behind):
         raw = lines.raw[at]
         match = _LINE.fullmatch(raw.rstrip(LINE_ENDS))
+        count += match is not None or not lines.is_blank(at)
+        if count > _MOST_DATA:
+            raise InvalidCommandError(
+                f"it has more than {_MOST_DATA} lines of data", hint="this is no file of a control, or it is damaged"
+            )
         if match is not None:
             value = match[2].translate(None, _BLANKS).decode("ascii")
             yield DataLine(at + 1, lines.offsets[at], raw, int(match[1]), value)

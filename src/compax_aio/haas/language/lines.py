@@ -3,15 +3,16 @@ r"""A file as lines: ends of blocks in any mix, and the ``%`` lines between whic
 from __future__ import annotations
 
 import re
+from array import array
 from bisect import bisect_right
-from itertools import accumulate, pairwise
-from typing import Final
+from collections.abc import Iterator, Sequence
+from typing import Final, overload
 
 from ...errors import InvalidCommandError
 from ..facts.characters import DC1, DC2, DC3, DC4, DELETE, NUL, SPACE, SUB
 from ..facts.eob import EobPattern
 
-__all__ = ["IGNORED", "LINE_ENDS", "SKIPPED", "Lines", "as_bytes", "eob_of"]
+__all__ = ["IGNORED", "LINE_ENDS", "SKIPPED", "LineView", "Lines", "as_bytes", "eob_of"]
 
 IGNORED: Final = bytes((NUL, DC1, DC2, DC3, DC4, SUB, DELETE))
 """Leader, reader, punch, fill: around the data they mean nothing, and within a block they are no text of it."""
@@ -20,6 +21,7 @@ SKIPPED: Final = IGNORED + bytes((SPACE,)) + b"\t"
 LINE_ENDS: Final = b"\r\n"
 _SKIPPED_AND_ENDS: Final = SKIPPED + LINE_ENDS
 
+_END: Final = re.compile(rb"\r\n?|\n")
 _DOUBLED: Final = {
     EobPattern.CR_CR: re.compile(rb"\r\r|\r\n|\r|\n"),
     EobPattern.LF_LF: re.compile(rb"\n\n|\r\n|\r|\n"),
@@ -27,6 +29,9 @@ _DOUBLED: Final = {
 _SINGLE_CR: Final = re.compile(rb"(?<!\r)\r(?:\r\r)*(?!\r)")
 _SINGLE_LF: Final = re.compile(rb"(?<!\n)\n(?:\n\n)*(?!\n)")
 _RUN_OF_ENDS: Final = re.compile(rb"[\r\n]+")
+_SMALL: Final = 1 << 32
+_MOST_PERCENTS: Final = 100_000
+"""A pair for each program that there can be is fewer by far."""
 
 
 def as_bytes(text: str | bytes | bytearray | memoryview) -> bytes:
@@ -68,9 +73,34 @@ def eob_of(data: bytes) -> EobPattern | None:
     return two if has_several and single.search(data) is None else one
 
 
+class LineView(Sequence[bytes]):
+    """Lines of a file, cut out of it when they are looked at: each of its own would take more room than it has."""
+
+    __slots__ = ("_data", "_offsets")
+
+    def __init__(self, data: bytes, offsets: Sequence[int]) -> None:
+        self._data = data
+        self._offsets = offsets
+
+    def __len__(self) -> int:
+        return len(self._offsets) - 1
+
+    @overload
+    def __getitem__(self, at: int) -> bytes: ...
+
+    @overload
+    def __getitem__(self, at: slice) -> list[bytes]: ...
+
+    def __getitem__(self, at: int | slice) -> bytes | list[bytes]:
+        if isinstance(at, slice):
+            return [self[each] for each in range(*at.indices(len(self)))]
+        index = range(len(self))[at]
+        return self._data[self._offsets[index] : self._offsets[index + 1]]
+
+
 class Lines:
     r"""
-    The lines of a file.
+    The lines of a file; of each, four bytes are kept beside the file.
 
     Args:
         data: The file, whole.
@@ -85,6 +115,9 @@ class Lines:
         percents: Indexes of the lines that are ``%`` alone.
         start: Index of the ``%`` that the data begin with, or None.
         end: Index of the ``%`` that they end with, or None.
+
+    Raises:
+        InvalidCommandError: There are more ``%`` lines than any file can have.
     """
 
     __slots__ = ("data", "end", "eob", "offsets", "percents", "raw", "start")
@@ -93,11 +126,9 @@ class Lines:
         self.data = data
         found = eob_of(data)
         self.eob = found if eob is None or found is None else _told_apart(found, EobPattern(eob))
-        self.raw = _split(data, self.eob if self.eob in _DOUBLED else None)
-        self.offsets = list(accumulate(map(len, self.raw), initial=0))
-        self.percents = [
-            at for at, line in enumerate(self.raw) if b"%" in line and line.strip(_SKIPPED_AND_ENDS) == b"%"
-        ]
+        self.offsets = _offsets(data, _END if self.eob is None else _DOUBLED.get(self.eob, _END))
+        self.raw = LineView(data, self.offsets)
+        self.percents = list(self._percent_lines())
         self.start, self.end = self._ends_of_data()
 
     @property
@@ -136,7 +167,26 @@ class Lines:
 
     def is_blank(self, at: int) -> bool:
         """Whether the line at that index holds nothing."""
-        return not self.raw[at].strip(_SKIPPED_AND_ENDS)
+        return self.are_blank(at, at + 1)
+
+    def are_blank(self, first: int, behind: int) -> bool:
+        """Whether the lines from that index on, and in front of the other one, hold nothing."""
+        return not self.data[self.offsets[first] : self.offsets[behind]].strip(_SKIPPED_AND_ENDS)
+
+    def _percent_lines(self) -> Iterator[int]:
+        count = 0
+        found = self.data.find(b"%")
+        while found >= 0:
+            at = bisect_right(self.offsets, found) - 1
+            if self.raw[at].strip(_SKIPPED_AND_ENDS) == b"%":
+                yield at
+                count += 1
+            if count > _MOST_PERCENTS:
+                raise InvalidCommandError(
+                    f"it has more than {_MOST_PERCENTS} lines that are % alone",
+                    hint="this is no file of a control, or it is damaged",
+                )
+            found = self.data.find(b"%", self.offsets[at + 1])
 
     def _percent_at(self, at: int) -> int:
         return self.offsets[at] + self.raw[at].index(b"%")
@@ -152,8 +202,8 @@ class Lines:
         if not self.percents:
             return None, None
         at = self.percents[0]
-        has_before = not all(map(self.is_blank, range(at)))
-        has_behind = not all(map(self.is_blank, range(at + 1, len(self.raw))))
+        has_before = not self.are_blank(0, at)
+        has_behind = not self.are_blank(at + 1, len(self.raw))
         return (None, at) if has_before and not has_behind else (at, None)
 
 
@@ -163,9 +213,10 @@ def _told_apart(found: EobPattern, told: EobPattern) -> EobPattern:
     return told if any({found, told} <= each for each in alike) else found
 
 
-def _split(data: bytes, doubled: EobPattern | None) -> list[bytes]:
-    if doubled is None:
-        return data.splitlines(keepends=True)  # of bytes: at CR, LF and CR LF, and nowhere else
-    ends = [0, *(match.end() for match in _DOUBLED[doubled].finditer(data)), len(data)]
-    pieces = [data[begin:end] for begin, end in pairwise(ends)]
-    return pieces if pieces[-1] else pieces[:-1]
+def _offsets(data: bytes, end: re.Pattern[bytes]) -> Sequence[int]:
+    """Return where each line begins, and how many bytes there are."""
+    offsets = array("I" if len(data) < _SMALL else "Q", [0])
+    offsets.extend(match.end() for match in end.finditer(data))
+    if offsets[-1] != len(data):
+        offsets.append(len(data))
+    return offsets

@@ -3,22 +3,29 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from bisect import bisect_left
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, overload
 
+from ...errors import InvalidCommandError
 from ..facts.eob import EobPattern
 from ..facts.programs import MAX_NAME_DIGITS
 from .lines import IGNORED, LINE_ENDS, SKIPPED, Lines, as_bytes
 
-__all__ = ["Block", "Name", "Program", "ProgramFile", "name_of_line", "parse_program_file"]
+__all__ = ["Block", "Blocks", "Name", "Program", "ProgramFile", "name_of_line", "parse_program_file"]
 
 _NAME: Final = re.compile(rb"[Oo][ \t]*([0-9]*)[ \t]*(\([^)]*\)?)?")
 
 
+_FIRST_SIGN: Final = re.compile(rb"(?<![^\r\n])[" + re.escape(SKIPPED) + rb"]*[Oo]")
+"""At the beginning of a line."""
+_MOST_PROGRAMS: Final = 10**MAX_NAME_DIGITS
+
+
 class Block(NamedTuple):
-    """One line of a program; a tuple, for a program has a hundred thousand of them."""
+    """One line of a program."""
 
     line: int
     """In the file, from 1."""
@@ -36,6 +43,65 @@ class Block(NamedTuple):
     def is_blank(self) -> bool:
         """Whether it holds nothing."""
         return not self.raw.rstrip(LINE_ENDS).strip(SKIPPED)
+
+
+class Blocks(Sequence[Block]):
+    """
+    Blocks of a program, made when they are looked at: kept, they would take ten times the room of the file.
+
+    Args:
+        lines: Of the file.
+        begin: Index of the first one.
+        behind: Index behind the last one.
+    """
+
+    __slots__ = ("_begin", "_behind", "_lines")
+
+    def __init__(self, lines: Lines, begin: int, behind: int) -> None:
+        self._lines = lines
+        self._begin = begin
+        self._behind = behind
+
+    def __len__(self) -> int:
+        return self._behind - self._begin
+
+    def __iter__(self) -> Iterator[Block]:
+        return map(self._block, range(self._begin, self._behind))
+
+    @overload
+    def __getitem__(self, at: int) -> Block: ...
+
+    @overload
+    def __getitem__(self, at: slice) -> tuple[Block, ...]: ...
+
+    def __getitem__(self, at: int | slice) -> Block | tuple[Block, ...]:
+        places = range(self._begin, self._behind)[at]
+        return self._block(places) if isinstance(places, int) else tuple(map(self._block, places))
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Blocks):
+            return NotImplemented
+        return len(self) == len(other) and all(one == another for one, another in zip(self, other, strict=True))
+
+    def __hash__(self) -> int:
+        return hash((self._begin, bytes(self)))
+
+    def __bytes__(self) -> bytes:
+        """Give all of them, one behind the other."""
+        offsets = self._lines.offsets
+        return self._lines.data[offsets[self._begin] : offsets[self._behind]]
+
+    def __repr__(self) -> str:
+        return f"<Blocks of lines {self._begin + 1} to {self._behind}>"
+
+    def without_blank_end(self) -> Blocks:
+        """Leave out the blank ones at the end."""
+        lines = self._lines
+        end = lines.offsets[self._begin] + len(bytes(self).rstrip(SKIPPED + LINE_ENDS))
+        return Blocks(lines, self._begin, bisect_left(lines.offsets, end))
+
+    def _block(self, at: int) -> Block:
+        return Block(at + 1, self._lines.offsets[at], self._lines.raw[at])
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +137,7 @@ class Program:
 
     name: Name | None
     """None if no ``O`` line stands in front of it: a control cannot store it."""
-    blocks: tuple[Block, ...]
+    blocks: Blocks
     """All of its lines, that of the name and blank ones too; one behind the other they are its bytes."""
 
     @property
@@ -101,7 +167,7 @@ class Program:
 
     def __bytes__(self) -> bytes:
         """Give the bytes it was made of."""
-        return b"".join(block.raw for block in self.blocks)
+        return bytes(self.blocks)
 
     def __str__(self) -> str:
         """Write ``O05555 (CS390_TEST)``."""
@@ -171,7 +237,8 @@ def parse_program_file(text: str | bytes, *, eob: EobPattern | str | None = None
             are one end of block if no end of the whole file is single.
 
     Raises:
-        InvalidCommandError: A character of the text has no code of 8 bits.
+        InvalidCommandError: A character of the text has no code of 8 bits; or there are more programs in it, or ``%``
+            lines, than there are numbers for programs.
 
     >>> file = parse_program_file(b"%\nO01234(FIRST)\nG0X0\nM30\n%\n")
     >>> file.programs[0].number, file.programs[0].comment, len(file.programs[0].blocks)
@@ -180,7 +247,7 @@ def parse_program_file(text: str | bytes, *, eob: EobPattern | str | None = None
     lines = Lines(as_bytes(text), eob)
     return ProgramFile(
         data=lines.data,
-        programs=tuple(_programs(lines)),
+        programs=tuple(_limited(_programs(lines))),
         lead_in=lines.lead_in,
         tail=lines.tail,
         payload=lines.payload,
@@ -199,12 +266,30 @@ def _programs(lines: Lines) -> Iterator[Program]:
         yield from _programs_between(lines, begin, end)
 
 
+def _limited(programs: Iterator[Program]) -> Iterator[Program]:
+    for count, each in enumerate(programs):
+        if count >= _MOST_PROGRAMS:
+            raise InvalidCommandError(
+                f"there are more than {_MOST_PROGRAMS} programs in it",
+                hint="a control has no numbers for so many: it is no file of one, or it is damaged",
+            )
+        yield each
+
+
 def _programs_between(lines: Lines, begin: int, end: int) -> Iterator[Program]:
-    raw = lines.raw
-    starts = [at for at in range(begin, end) if raw[at].lstrip(SKIPPED)[:1] in (b"O", b"o")]
-    first = starts[0] if starts else end
-    if not all(map(lines.is_blank, range(begin, first))):
-        starts.insert(0, begin)
-    for at, behind in pairwise([*starts, end]):
-        blocks = zip(range(at + 1, behind + 1), lines.offsets[at:behind], raw[at:behind], strict=True)
-        yield Program(name=name_of_line(raw[at]), blocks=tuple(map(Block._make, blocks)))
+    for at, behind in pairwise(_borders(lines, begin, end)):
+        yield Program(name=name_of_line(lines.raw[at]), blocks=Blocks(lines, at, behind))
+
+
+def _borders(lines: Lines, begin: int, end: int) -> Iterator[int]:
+    """Give the index of the first line of each program, and that behind the last one."""
+    is_first = True
+    for match in _FIRST_SIGN.finditer(lines.data, lines.offsets[begin], lines.offsets[end]):
+        at = bisect_left(lines.offsets, match.start())
+        if is_first and not lines.are_blank(begin, at):
+            yield begin
+        is_first = False
+        yield at
+    if is_first and not lines.are_blank(begin, end):
+        yield begin
+    yield end
