@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from compax_aio.cli import app
+from compax_aio.cli.exchanging import sending
 from compax_aio.simulator.clock import VirtualClockLoop
 from compax_aio.simulator.haas import Knobs, LogKind, SimulatedControl
 from compax_aio.simulator.server import control_named
@@ -424,6 +425,63 @@ def test_what_goes_over_the_line_is_recorded(compax: Compax, on_stage: Plan) -> 
     assert Path("trace.jsonl").stat().st_size > 0
 
 
+@pytest.mark.parametrize("typed", [("yes", 1), ("PARAMETERS", 0)])
+def test_a_word_is_typed_for_parameters(
+    compax: Compax, on_stage: Plan, mill: dict[str, Any], monkeypatch: pytest.MonkeyPatch, typed: tuple[str, int]
+) -> None:
+    mill["profile"] = "dc_codes"
+    answer, code = typed
+    asked: list[str] = []
+
+    async def answer_to(question: str) -> str:
+        asked.append(question)
+        return answer
+
+    monkeypatch.setattr(sending, "answer_to", answer_to)
+    monkeypatch.setattr(sending, "expect_somebody", lambda **_: None)
+    Path("parameters.txt").write_text(PARAMETERS)
+    on_stage(1.0, recv("parameters"))
+    said, text = compax("send", URL, "parameters.txt", *DC_CODES, "--i-know-parameters-take-effect")
+    assert said == code
+    assert "wrong ones can damage the machine. To send parameters.txt to sim://haas?name=mill, type" in asked[0]
+    assert ("Nothing was sent." in text) is (code == 1)
+
+
+@pytest.mark.parametrize("typed", [(False, 1), (True, 0)])
+def test_it_is_asked_whether_the_machine_is_clear(
+    compax: Compax, on_stage: Plan, mill: dict[str, Any], monkeypatch: pytest.MonkeyPatch, typed: tuple[bool, int]
+) -> None:
+    mill["profile"] = "dc_codes"
+    answer, code = typed
+
+    async def confirm(_: str) -> bool:
+        return answer
+
+    monkeypatch.setattr(sending, "confirm", confirm)
+    monkeypatch.setattr(sending, "expect_somebody", lambda **_: None)
+    on_stage(1.0, SimulatedControl.press_dnc)
+    assert compax("send", URL, "new.nc", *DC_CODES, "--dnc")[0] == code
+
+
+def test_what_is_odd_about_a_file_is_told_and_so_is_a_code_that_does_not_come(
+    compax: Compax, on_stage: Plan, mill: dict[str, Any]
+) -> None:
+    mill.update(profile="dc_codes", drop_dc3=True)
+    Path("odd.nc").write_text("%\nO00077\nG0 (OPEN\nM30\n%\n")
+    on_stage(1.0, recv())
+    code, text = compax("send", URL, "odd.nc", *DC_CODES)
+    assert code == 0
+    assert "odd.nc:3:4: warning: a comment that does not end in its line" in text
+    assert "odd.nc: the control has not said that it has read the last % (DC3)" in text
+
+
+def test_what_is_odd_about_what_came_is_told(compax: Compax, on_stage: Plan) -> None:
+    on_stage(1.0, send("ALL"))
+    code, text = compax("receive", URL, "program", "-o", "all.nc")
+    assert code == 0
+    assert "3 programs came, and one was expected: was ALL chosen at the control?" in text
+
+
 # Query and watch ----------------------------------------------------------------------------------------------------
 
 
@@ -496,6 +554,13 @@ def test_programs_read_readings_and_events(on_stage: Plan, capsys: pytest.Captur
     assert readings[0]["values"]["Q500"]["status"] == "IDLE"
     assert "Q999" in readings[0]["errors"]
     assert {"event": "printed", "text": "PART 7"} in documents
+
+
+def test_an_answer_to_somebody_else_is_told(compax: Compax, on_stage: Plan) -> None:
+    on_stage(1.5, lambda control: control.overhear("S/N, 7"))
+    code, text = compax("watch", URL, "Q500", "--count", "3")
+    assert code == 0
+    assert "overheard: S/N, 7" in text
 
 
 def test_watching_ends_by_ctrl_c(compax: Compax, on_stage: Plan) -> None:

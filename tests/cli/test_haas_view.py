@@ -6,17 +6,24 @@ import asyncio
 import io
 import logging
 import re
+import signal
 import sys
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import contextmanager
+from datetime import timedelta
 from typing import Any
 
 import pytest
 
-from compax_aio import AnswerTimeoutError
-from compax_aio.cli.exchanging.asking import request_of
+from compax_aio import AnswerTimeoutError, InvalidCommandError
+from compax_aio.cli.exchanging import operator
+from compax_aio.cli.exchanging.asking import meaning_of, request_of, value_as_json, value_in_words
 from compax_aio.cli.exchanging.view import TransferView, written_time
-from compax_aio.cli.exchanging.watching import Display
+from compax_aio.cli.exchanging.watching import Display, follow_events
 from compax_aio.cli.printing import Printing
+from compax_aio.haas.answers import Request, decode
+from compax_aio.haas.events import ConnectionLost, ConnectionRestored, DriveEvent, Overheard, Printed, ReaderOn
+from compax_aio.haas.profiles import CLASSIC, CLASSIC_XMODEM, Profile
 from compax_aio.haas.transfer import TransferPhase, TransferProgress
 from compax_aio.haas.watching import Reading
 
@@ -210,3 +217,117 @@ async def test_readings_are_shown_in_place_with_their_age_and_the_last_news(open
     assert "PART 2" not in last
     assert "PART 6" in last
     assert last.count("the line was lost") == 1
+
+
+class _Happening:
+    """A control of which nothing is asked but what happens."""
+
+    async def events(self) -> AsyncIterator[DriveEvent]:
+        yield Printed("mill", 0.0, "PART 1", is_damaged=True)
+        yield Overheard("mill", 0.0, "S/N, 7")
+        yield ConnectionLost("mill", 0.0, "the port went away; was it unplugged? a drive may move")
+        yield ConnectionRestored("mill", 0.0, 5.5, 2, ())
+        yield ReaderOn("mill", 0.0)
+
+
+async def test_what_happens_meanwhile_is_told() -> None:
+    told: list[tuple[str, str]] = []
+    await follow_events(_Happening(), lambda event, text: told.append((event, text)))  # type: ignore[arg-type]
+    assert told == [
+        ("printed", "PART 1 (damaged)"),
+        ("overheard", "S/N, 7"),
+        ("connection_lost", "the line was lost, and is tried again: the port went away"),
+        ("connection_restored", "the line is back after 5.5 s"),
+    ]
+
+
+# What is asked ------------------------------------------------------------------------------------------------------
+
+
+def test_answers_are_values_for_programs_and_words_for_people() -> None:
+    busy = decode(Request.of("Q104"), "STATUS, BUSY")
+    other = decode(Request.of("Q999"), "SOMETHING, 1, 2")
+    assert (value_as_json(busy), value_in_words(busy)) == ({"busy": True}, "busy: a cycle runs")
+    assert (value_as_json(other), value_in_words(other)) == (["SOMETHING", "1", "2"], "SOMETHING, 1, 2")
+    assert value_in_words(timedelta(hours=6282, minutes=17, seconds=13)) == "6282:17:13 h"
+    assert meaning_of(request_of("Q999")) == "not known here"
+
+
+# Who presses Enter --------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def keys(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Callable[[str], None], Callable[[], None]]]:
+    """Sit at a terminal; gives what takes a key, and what is called when the terminal is gone."""
+    heard: list[tuple[Callable[[str], None], Callable[[], None]]] = []
+
+    @contextmanager
+    def keys_pressed(on_key: Callable[[str], None], on_end: Callable[[], None]) -> Iterator[None]:
+        heard.append((on_key, on_end))
+        yield
+        heard.clear()
+
+    monkeypatch.setattr(operator, "keys_pressed", keys_pressed)
+    monkeypatch.setattr(sys, "stdin", _Terminal())
+    return heard
+
+
+Keys = list[tuple[Callable[[str], None], Callable[[], None]]]
+
+
+async def test_enter_alone_says_that_recv_is_pressed(open_terminal: Opener, keys: Keys) -> None:
+    terminal = open_terminal("stderr")
+    somebody = operator.Operator(CLASSIC, Printing(), sends=True)
+    with TransferView("job.nc", Printing()) as view:
+        view.show(progress("waiting for operator", 0, operator="press RECV"))
+        asked = somebody.ask(view)
+        assert asked is not None
+        waiting = asyncio.ensure_future(asked)
+        await asyncio.sleep(0)
+        assert "press RECV; then press Enter here" in seen(terminal)
+        ((on_key, _),) = keys
+        on_key("x")
+        await asyncio.sleep(1)
+        assert not waiting.done()
+        on_key("c-m")
+        on_key("c-m")
+        await waiting
+        assert keys == []
+        assert somebody.ask(view) is None  # what is read back begins by itself
+
+
+async def test_ctrl_c_and_a_terminal_that_is_gone_are_what_they_always_are(
+    open_terminal: Opener, keys: Keys, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    open_terminal("stderr")
+    raised: list[int] = []
+    monkeypatch.setattr(signal, "raise_signal", raised.append)
+    somebody = operator.Operator(CLASSIC, Printing(), sends=True)
+    with TransferView("job.nc", Printing()) as view:
+        asked = somebody.ask(view)
+        assert asked is not None
+        waiting = asyncio.ensure_future(asked)
+        await asyncio.sleep(0)
+        ((on_key, on_end),) = keys
+        on_key("interrupt")
+        on_end()
+        waiting.cancel()
+    assert raised == [signal.SIGINT, signal.SIGHUP]
+
+
+@pytest.mark.parametrize(
+    ("profile", "options"), [(CLASSIC_XMODEM, {}), (CLASSIC, {"is_ready": True}), (CLASSIC, {"sends": False})]
+)
+async def test_nobody_is_asked_where_that_is_known(
+    profile: Profile, options: dict[str, Any], keys: Keys, open_terminal: Opener
+) -> None:
+    open_terminal("stderr")
+    somebody = operator.Operator(profile, Printing(), **{"sends": True, **options})
+    with TransferView("job.nc", Printing()) as view:
+        assert somebody.ask(view) is None
+
+
+def test_programs_cannot_be_asked(keys: Keys, open_terminal: Opener) -> None:
+    open_terminal("stderr")
+    with pytest.raises(InvalidCommandError, match="--ready"):
+        operator.Operator(CLASSIC, Printing(json=True), sends=True)

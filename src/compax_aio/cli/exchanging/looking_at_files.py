@@ -18,9 +18,10 @@ from compax_aio.severity import Severity
 from ..exit_codes import OK
 from ..interruption import moves_nothing
 from ..printing import Printing
+from ..problems import has_errors, told
 from .files import ControlFile, KindOption, NamedFile, read_file
 from .line import SetUp
-from .problems import Meant, as_data, has_errors, problems_of, told
+from .problems import Meant, as_data, problems_of
 
 __all__ = ["check", "compare"]
 

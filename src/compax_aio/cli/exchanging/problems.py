@@ -4,24 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, Final
+from typing import Annotated, Any
 
 from cyclopts import Parameter
-from rich.text import Text
 
-from compax_aio import InvalidCommandError
-from compax_aio.escaping import escaped
 from compax_aio.haas.checking import Problem, check_data_file, check_program
 from compax_aio.haas.profiles import Profile
-from compax_aio.severity import Severity
 
+from .. import problems
 from .files import NamedFile
 
-__all__ = ["Meant", "as_data", "expect_sound", "has_errors", "problems_of", "told"]
-
-_LOOKS: Final = {Severity.ERROR: "bold red", Severity.WARNING: "yellow", Severity.NOTE: "dim"}
-_MOST_TOLD: Final = 10
-"""Errors that are told where a file is refused; `check` tells them all."""
+__all__ = ["Meant", "as_data", "expect_sound", "problems_of"]
 
 
 @Parameter(name="*")
@@ -53,48 +46,16 @@ def problems_of(file: NamedFile, profile: Profile, meant: Meant) -> tuple[Proble
     return check_data_file(file.data, file.data_kind, force=meant.without_n9999)
 
 
-def has_errors(problems: Sequence[Problem]) -> bool:
-    """Whether one of them keeps the file from being sent."""
-    return any(each.severity is Severity.ERROR for each in problems)
-
-
-def told(name: str, problems: Sequence[Problem]) -> Text:
-    """Write *problems* for people, a line each, as compilers do."""
-    text = Text()
-    for each in problems:
-        text.append(f"{name}:{each.line}:{each.column}: ")
-        text.append(f"{each.severity.value}: ", style=_LOOKS[each.severity])
-        text.append(f"{escaped(each.what)}; ")
-        raised = f" (the control would raise {each.alarm})" if each.alarm is not None else ""
-        text.append(f"{escaped(each.hint)}{raised}\n", style="dim")
-    return text
-
-
 def as_data(problem: Problem) -> dict[str, Any]:
     """Return a problem as programs read it."""
-    return {
-        "line": problem.line,
-        "column": problem.column,
-        "offset": problem.offset,
-        "severity": problem.severity.value,
-        "what": problem.what,
-        "hint": problem.hint,
-        "alarm": None if problem.alarm is None else str(problem.alarm),
-    }
+    return {**problems.as_data(problem), "alarm": None if problem.alarm is None else str(problem.alarm)}
 
 
-def expect_sound(file: NamedFile, problems: Sequence[Problem]) -> None:
+def expect_sound(file: NamedFile, found: Sequence[Problem]) -> None:
     """
     Do nothing if nothing keeps the file from being sent.
 
     Raises:
         InvalidCommandError: With the first of the errors in it.
     """
-    errors = [each for each in problems if each.severity is Severity.ERROR]
-    if not errors:
-        return
-    lines = [f"{each.line}:{each.column}: {each.what}; {each.hint}" for each in errors[:_MOST_TOLD]]
-    if len(errors) > _MOST_TOLD:
-        lines.append(f"and {len(errors) - _MOST_TOLD} more, which `compax haas check` tells")
-    count = "there is an error" if len(errors) == 1 else f"there are {len(errors)} errors"
-    raise InvalidCommandError("\n  ".join([f"{count} in the file:", *lines]), device=file.name)
+    problems.expect_sound(file.name, found, "the file", all_told_by="compax haas check")

@@ -17,11 +17,12 @@ from ..exit_codes import OK
 from ..half_way import Yes
 from ..interruption import say_at_end
 from ..printing import Printing
+from ..problems import told
 from .conducting import Conductor, OnOperator
 from .files import ControlFile, KindOption, NamedFile, read_file
 from .line import ControlLine, ControlUrl, SetUp
 from .operator import Operator, Ready
-from .problems import Meant, expect_sound, problems_of, told
+from .problems import Meant, expect_sound, problems_of
 from .view import written_time
 
 __all__ = ["send"]

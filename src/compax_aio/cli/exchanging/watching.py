@@ -29,7 +29,7 @@ from .asking import Question, meaning_of, request_of, value_as_json, value_in_wo
 from .line import ControlLine, ControlUrl, SetUp
 from .warned import warnings_told_by
 
-__all__ = ["Display", "watch"]
+__all__ = ["Display", "follow_events", "watch"]
 
 _USUAL: Final = ("Q500", "Q104", "Q201")
 _MOST_NEWS: Final = 5
@@ -68,7 +68,7 @@ async def watch(
     async with line.open(url, profile) as control:
         display = Display(requests, printing)
         with display:
-            listening = asyncio.create_task(_follow_events(control, display.tell))
+            listening = asyncio.create_task(follow_events(control, display.tell))
             ageing = asyncio.create_task(display.grow_old())
             try:
                 await _follow(control, requests, display, interval, count, only_changes=changes)
@@ -102,7 +102,8 @@ def _quantity(request: Request) -> str | int:
     return request.text if request.variable is None else request.variable
 
 
-async def _follow_events(control: Control, tell: Callable[[str, str], None]) -> None:
+async def follow_events(control: Control, tell: Callable[[str, str], None]) -> None:
+    """Tell what happens at the control meanwhile: printed lines, answers to others, a line that is lost or back."""
     async for event in control.events():
         if isinstance(event, Printed):
             tell("printed", f"{event.text}{' (damaged)' if event.is_damaged else ''}")
