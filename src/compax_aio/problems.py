@@ -29,9 +29,14 @@ class Problem:
     what: str
     hint: str
 
+    @property
+    def advice(self) -> str:
+        """What to do, and what comes of it else, where that is known."""
+        return self.hint
+
     def __str__(self) -> str:
         """Write ``line 3, column 7: error: …; …``."""
-        return f"line {self.line}, column {self.column}: {self.severity.value}: {self.what}; {self.hint}"
+        return f"line {self.line}, column {self.column}: {self.severity.value}: {self.what}; {self.advice}"
 
 
 class Found(Protocol):

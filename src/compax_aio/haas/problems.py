@@ -24,10 +24,10 @@ class Problem(AnyProblem):
     alarm: Alarm | None = None
     """What the control is known to raise for it."""
 
-    def __str__(self) -> str:
-        """Write ``line 3, column 7: error: …; …``."""
-        raised = f" (the control would raise {self.alarm})" if self.alarm is not None else ""
-        return f"{AnyProblem.__str__(self)}{raised}"
+    @property
+    def advice(self) -> str:
+        """What to do, and what the control is known to raise else."""
+        return self.hint if self.alarm is None else f"{self.hint} (the control would raise {self.alarm})"
 
 
 class Kind(Enum):

@@ -17,12 +17,13 @@ from ..half_way import Yes
 from ..interruption import in_motion, say_at_end
 from ..number_words import NUMBER
 from ..printing import Printing
+from ..problems import as_data
 from .jobs import STANDARD_INPUT, JobFile, expect_one_input
 from .keys import pause_key
 from .line import CutterLine, CutterUrl, Machine
 from .outline import written_time
 from .planning import Plan, PlannedJob, baud_rate_of
-from .problems import SheetSize, as_data
+from .sheet_size import SheetSize
 from .view import CutView
 
 __all__ = ["cut"]

@@ -14,10 +14,11 @@ from ..exit_codes import OK
 from ..files import Force, expect_free
 from ..interruption import moves_nothing
 from ..printing import Printing
+from ..problems import as_data, has_errors, told
 from .jobs import STANDARD_INPUT, JobFile, read_job
 from .line import Machine
 from .outline import outline_of, outline_told
-from .problems import SheetSize, as_data, has_errors, told
+from .sheet_size import SheetSize
 
 __all__ = ["check", "preview"]
 

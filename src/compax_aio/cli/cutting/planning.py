@@ -11,9 +11,9 @@ from compax_aio.camm1.previewing.tool_path import drawing_of
 from compax_aio.transports.url import TransportURL
 
 from ..printing import Printing
+from ..problems import expect_sound, has_errors, told
 from .jobs import NamedJob, read_job_patiently
 from .outline import Outline, outline_of, show_outline
-from .problems import expect_sound, has_errors, told
 from .tuning import tuned
 
 __all__ = ["Plan", "PlannedJob", "baud_rate_of"]
@@ -53,7 +53,8 @@ class Plan:
         named = NamedJob(read.name, job.data, job)
         problems = camm1.check(job, self.profile, self.sheet)
         if self.is_checked:
-            expect_sound(named, problems)
+            hint = "`compax camm1 preview` shows where; --no-check sends it all the same"
+            expect_sound(named.name, problems, "the job", hint=hint)
         outline = outline_of(named, drawing_of(job.instructions), self.profile, self.baud_rate)
         show_outline(outline, printing)
         if problems:
