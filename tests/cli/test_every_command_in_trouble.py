@@ -354,8 +354,8 @@ def in_the_middle_of_a_file(receive: Words, send: Words, feed: Words) -> Iterato
         nobody = partial(cell, when=asked, does=CTRL_C, code=130)
         yield nobody("Ctrl-C before a key is pressed", says=("nothing of the file (was sent|came)",))
     cell = partial(Cell, "haas receive", receive, "--silence-timeout 1", device="control", leaves="")
-    begin = (("SEND", f"{AT_FAR_END}send O00010"), ("bytes/s", f"{AT_FAR_END}reset"))
-    yield cell("RESET in the middle", then=begin, code=4, says=("fallen silent", "was RESET pressed", r"\.incomplete"))
+    reset = (("SEND", f"{AT_FAR_END}send O00010"), ("bytes/s", f"{AT_FAR_END}reset"))
+    yield cell("RESET in the middle", then=reset, code=4, says=("fallen silent", "was RESET pressed", r"\.incomplete"))
 
 
 def without_a_line() -> Iterator[Cell]:

@@ -158,6 +158,17 @@ def test_a_file_that_is_there_is_not_written_over(compax: Compax, on_stage: Plan
     assert "O00010" in Path("ten.nc").read_text()
 
 
+@pytest.mark.parametrize("out", ["backup/", "nowhere/ten.nc", ""])
+def test_a_folder_is_not_taken_for_a_file(compax: Compax, on_stage: Plan, out: str) -> None:
+    code, text = compax("receive", URL, "program", "--out", out)
+    assert code == 2
+    assert "there is no folder" in text
+    Path("backup").mkdir()
+    on_stage(1.0, send("O01234"))
+    assert compax("receive", URL, "program", "--out", "backup/")[0] == 0
+    assert len(list(Path("backup").glob("O01234 *.nc"))) == 1
+
+
 def test_nobody_presses_send(compax: Compax) -> None:
     code, text = compax("receive", URL, "program", "-o", "ten.nc", "--operator-timeout", "5")
     assert code == 4

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 from cyclopts import Parameter
 
+from compax_aio import InvalidCommandError
 from compax_aio.escaping import escaped
 from compax_aio.haas.control import Control
 from compax_aio.haas.language.program_file import ProgramFile
@@ -50,13 +52,13 @@ async def receive(
     what: Annotated[What, Parameter(help="What is chosen at the control; programs: ALL.")],
     *,
     out: Annotated[
-        Path,
+        str,
         Parameter(
             name=("--out", "-o"),
             help="File; or a folder, in which it gets a name by what it is and the time. The current folder if not "
             "given.",
         ),
-    ] = Path(),
+    ] = ".",
     verify: Annotated[bool, Parameter(negative=(), help="Receive it twice, and compare byte for byte.")] = False,
     accept_damaged: Annotated[
         bool, Parameter(negative=(), help="Keep it although it is known to be damaged, or not known to be whole.")
@@ -80,20 +82,35 @@ async def receive(
     ```
     """
     profile = set_up.known()
-    if not out.is_dir():
-        expect_free(out, force=force)
+    place = _place(out, force=force)
     conductor = Conductor(printing, Operator(profile, printing, sends=False))
 
     def begin(control: Control, on_operator: OnOperator) -> Transfer[Received]:
-        how: dict[str, Any] = {"archive": out, "verify": verify, "accept_damaged": accept_damaged}
+        how: dict[str, Any] = {"archive": place, "verify": verify, "accept_damaged": accept_damaged}
         transfer: Transfer[Received] = getattr(control, f"receive_{what}")(on_operator=on_operator, **how)
         return transfer
 
     with conductor.telling():
         async with line.open(url, profile) as control:
             received = await conductor.carry_out(what, lambda on_operator: begin(control, on_operator))
-    _tell_received(received, out, conductor.took_s, printing)
+    _tell_received(received, place, conductor.took_s, printing)
     return OK
+
+
+def _place(out: str, *, force: bool) -> Path:
+    """
+    Return the file, or the folder that there is; to be asked before anybody goes to the control.
+
+    Raises:
+        InvalidCommandError: It cannot be written, or there is no such folder.
+    """
+    place = Path(out)
+    if out and place.is_dir():
+        return place
+    if not out or out.endswith(("/", os.sep)):  # an empty word is that of a script whose variable is not set
+        raise InvalidCommandError(f"there is no folder {out!r}", hint="make it first")
+    expect_free(place, force=force)
+    return place
 
 
 def _tell_received(received: Received, out: Path, took_s: float, printing: Printing) -> None:

@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-import asyncio
-import sys
 from collections import deque
-from collections.abc import AsyncIterator, Iterator, Mapping
-from contextlib import ExitStack, asynccontextmanager
+from collections.abc import Iterator, Mapping
 from typing import Final
 
 from rich.console import Group, RenderableType
-from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from compax_aio.escaping import escaped
 from compax_aio.haas.transfer import TransferPhase, TransferProgress
 
-from ..outlets import is_held_up
-from ..printing import Printing, notes_console
-from .warned import warnings_told_by
+from ..live_picture import TICK_S, LivePicture
+from ..printing import Printing
 
 __all__ = ["TransferView", "written_time"]
 
@@ -36,13 +30,10 @@ _PHASES: Final[Mapping[TransferPhase, str]] = {
 _TOLD: Final = frozenset({"under way", "ending", "verifying"})
 """Without a terminal; others come and go many times."""
 _BAR_WIDTH: Final = 24
-_TICK_S: Final = 0.5
-_LEAST_PAUSE_S: Final = 0.05
-"""Between two pictures: nobody sees more, and lines are slow."""
 _RATE_OVER_S: Final = 4.0
 
 
-class TransferView:
+class TransferView(LivePicture):
     """
     Shows how a transfer gets on.
 
@@ -55,57 +46,17 @@ class TransferView:
     """
 
     def __init__(self, title: str, printing: Printing) -> None:
+        super().__init__(printing)
         self._title = title
-        self._printing = printing
         self._asks = ""
         self.took_s = 0.0
         self._first_at: float | None = None
         self._is_again = False
         """A second look is under way, whose time is not counted."""
-        self._live: Live | None = None
-        self._warnings = ExitStack()
         self._told: tuple[str | None, TransferPhase | None] = (None, None)
         self._progress: TransferProgress | None = None
         self._got_at = 0.0
-        self._drawn_at = float("-inf")
         self._past: deque[tuple[float, int]] = deque()
-
-    def __enter__(self) -> TransferView:
-        if not self._printing.json and sys.stderr.isatty():
-            console = notes_console()
-            console.soft_wrap = False
-            self._live = Live(console=console, auto_refresh=False, transient=True)
-            self._live.start()
-            self._warnings.enter_context(warnings_told_by(self._warn))
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.clear()
-
-    def clear(self) -> None:
-        """Show nothing any more, and leave the terminal as it was before."""
-        live, self._live = self._live, None
-        if live is not None:
-            live.stop()
-            self._warnings.close()
-
-    def _warn(self, text: str) -> None:
-        if self._live is not None:
-            self._live.console.print(Text.assemble(("warning: ", "yellow"), escaped(text)))
-
-    @asynccontextmanager
-    async def ticking(self) -> AsyncIterator[None]:
-        """Let the time go on during a block, also where nothing else happens."""
-        ticker = asyncio.ensure_future(self._tick())
-        try:
-            yield
-        finally:
-            ticker.cancel()
-
-    async def _tick(self) -> None:
-        while True:
-            await asyncio.sleep(_TICK_S)
-            self._draw()
 
     def ask(self, text: str) -> None:
         """Ask *text* here, behind what has to be done at the control; empty: nothing."""
@@ -121,8 +72,7 @@ class TransferView:
         self._progress, self._got_at = progress, self._now()
         self._note_bytes(progress.bytes)
         self._tell(progress)
-        if self._live is not None and (is_news or self._got_at - self._drawn_at >= _LEAST_PAUSE_S):
-            self._draw()
+        self._draw(is_news=is_news)
 
     def _note_bytes(self, count: int) -> None:
         before = self._past[-1][1] if self._past else 0
@@ -147,16 +97,9 @@ class TransferView:
             self._told = (operator, progress.phase)
             self._printing.note(f"{self._title}: {_PHASES[progress.phase]}")
 
-    def _draw(self) -> None:
-        if self._live is not None and self._progress is not None and not is_held_up(self._live.console.file):
-            self._drawn_at = self._now()
-            self._live.update(self._picture(self._progress), refresh=True)
-
-    @staticmethod
-    def _now() -> float:
-        return asyncio.get_running_loop().time()
-
-    def _picture(self, progress: TransferProgress) -> Group:
+    def _picture(self) -> Group | None:
+        if (progress := self._progress) is None:
+            return None
         if progress.operator is not None:
             elapsed_s = progress.elapsed_s + self._now() - self._got_at
             ask = f"{progress.operator}{self._asks}"
@@ -197,7 +140,7 @@ class TransferView:
         now = self._now()
         while len(self._past) > 1 and now - self._past[1][0] > _RATE_OVER_S:
             self._past.popleft()
-        if not self._past or now - self._past[0][0] < _TICK_S:
+        if not self._past or now - self._past[0][0] < TICK_S:
             return None
         began_at, bytes_before = self._past[0]
         return (self._past[-1][1] - bytes_before) / (now - began_at)

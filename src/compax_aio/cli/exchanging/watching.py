@@ -25,9 +25,9 @@ from ..interruption import moves_nothing, say_at_end
 from ..number_words import NUMBER, WHOLE
 from ..outlets import is_held_up
 from ..printing import Printing, results_console
+from ..warned import warnings_told_by
 from .asking import Question, meaning_of, request_of, value_as_json, value_in_words
 from .line import ControlLine, ControlUrl, SetUp
-from .warned import warnings_told_by
 
 __all__ = ["Display", "follow_events", "watch"]
 
