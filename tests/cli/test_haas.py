@@ -370,6 +370,7 @@ def test_a_program_is_fed_while_the_machine_runs_it(compax: Compax, on_stage: Pl
     assert code == 0
     assert "press MDI/DNC twice" in text
     assert "new.nc: fed, 35 bytes" in text
+    assert "only its screen shows: whether the machine has run it to its end" in text
     assert "O00077" not in mill["far_end"].memory.programs
 
 

@@ -48,7 +48,7 @@ def test_data_are_compared_by_their_numbers() -> None:
     assert verified.proves.endswith("and 3 more")
 
 
-@pytest.mark.parametrize(("kind", "is_data"), [("program", False), ("drip feed", False), ("settings", True)])
+@pytest.mark.parametrize(("kind", "is_data"), [("program", False), ("programs", False), ("settings", True)])
 def test_what_only_the_screen_can_say_is_said(kind: Kind, is_data: bool) -> None:
     text = only_on_screen(kind, is_read_back=False)
     assert "RS232 DONE or RS232 ABORT" in text
@@ -64,3 +64,8 @@ def test_damage_is_said_in_words() -> None:
     assert counted
     assert str(counted) == "1 byte cannot be right, at offset 7 and the port has counted 1 parity error"
     assert not Damage(counted=LineErrors())
+
+
+def test_of_a_drip_feed_nothing_is_stored() -> None:
+    assert "nothing of it is stored" in only_on_screen("drip feed", is_read_back=False)
+    assert "RS232 DONE" not in only_on_screen("drip feed", is_read_back=False)

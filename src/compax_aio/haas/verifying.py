@@ -18,6 +18,7 @@ ONLY_ON_SCREEN: Final = (
 )
 _DATA_ONLY_ON_SCREEN: Final = "; data are loaded even where there is an alarm"
 _MOST_TOLD: Final = 5
+_AFTER_FEEDING: Final = "whether the machine has run it to its end, and the alarms; nothing of it is stored"
 _AFTER_READING_BACK: Final = "alarms, and whether the machine shall work with it"
 
 
@@ -40,6 +41,8 @@ def only_on_screen(kind: Kind, *, is_read_back: bool) -> str:
     """Say what nobody but the control's screen tells of a file that was sent."""
     if is_read_back:
         return _AFTER_READING_BACK
+    if kind == "drip feed":
+        return _AFTER_FEEDING
     return ONLY_ON_SCREEN + (_DATA_ONLY_ON_SCREEN if kind in {"parameters", "settings", "offsets", "macros"} else "")
 
 

@@ -62,9 +62,6 @@ class Conductor:
                         view.show(progress)
                     self.took_s = view.took_s
                     return await transfer
-            except asyncio.CancelledError:
-                transfer.cancel()
-                raise
             except CompaxError as error:
                 _tell_people(error)
                 raise
