@@ -14,14 +14,18 @@ from enum import Enum
 from typing import Final, Literal
 
 from .facts.characters import (
+    ACK,
+    CAN,
     CARRIAGE_RETURN,
     DC1,
     DC2,
     DC3,
     DC4,
     DELETE,
+    EOT,
     ETB,
     LINE_FEED,
+    NAK,
     NUL,
     PROMPT,
     SPACE,
@@ -41,8 +45,8 @@ _TAIL: Final = bytes([CARRIAGE_RETURN, LINE_FEED, PROMPT])
 _LINE_ENDS: Final = bytes([CARRIAGE_RETURN, LINE_FEED])
 _LEFT_OVER: Final = (bytes([PROMPT]), WRITE_DONE.encode())
 """The end of an answer whose beginning was lost; and an answer to a write that has no frame."""
-_NOT_PRINTED: Final = frozenset({NUL, DELETE, DC1, DC2, DC3, DC4})
-"""Leader, flow control, and what POPEN and PCLOS send."""
+_NOT_PRINTED: Final = frozenset({NUL, DELETE, DC1, DC2, DC3, DC4, ACK, NAK, CAN, EOT})
+"""Leader, flow control, what POPEN and PCLOS send, and what comes behind a file by XMODEM."""
 
 
 @dataclass(frozen=True, slots=True)

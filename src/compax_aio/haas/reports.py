@@ -46,6 +46,16 @@ _STORIES: Final[Mapping[Ending, tuple[type[CompaxError], str, str]]] = {
         "the control has fallen silent in the middle of the {kind}",
         f"was RESET pressed? {_SCREEN}; then begin anew: a transfer is never resumed",
     ),
+    Ending.END_UNANSWERED: (
+        AnswerTimeoutError,
+        "the control has taken all of the {kind}, and not acknowledged its end",
+        f"whether it is stored is not known: {_SCREEN}",
+    ),
+    Ending.UNLIKE: (
+        UnexpectedAnswerError,
+        "the control sends by another synchronization than the profile {profile!r} has",
+        "set both to the same: Setting 14 (synchronization) of the control, and the profile; then begin anew",
+    ),
     Ending.HELD_TOO_LONG: (
         AnswerTimeoutError,
         "the control has told to stop (Xoff) and never to go on",

@@ -198,3 +198,61 @@ def test_a_transfer_that_has_not_begun_can_be_given_up() -> None:
     strategy = send_file("xmodem", "send", PROGRAM, patience=PATIENCE)
     strategy.give_up()
     assert strategy.ending is Ending.GIVEN_UP
+
+
+# A program prints, or sends by another synchronisation ----------------------------------------------------------------
+
+PRINTED = b"COUNT 12 X1.2345 Y2.3456\r\n"
+
+
+def test_what_a_program_prints_before_the_first_block_is_none_of_the_file_and_no_damage() -> None:
+    bench = Reception()
+    for _ in range(30):
+        bench.wait(3)
+        bench.come(PRINTED[:9], PRINTED[9:])
+    assert bench.foreign == PRINTED * 30
+    assert bench.sent == NAK * 10  # every ten seconds, whatever is printed
+    for index in range(1, BLOCKS + 1):
+        bench.come(block(PROGRAM, index))
+        bench.wait(0.2)
+    bench.come(EOT)
+    assert bench.wait_for_end(within_s=1) is Ending.COMPLETE
+    assert bench.file == PROGRAM
+
+
+def test_a_program_that_prints_gives_the_operator_no_more_time() -> None:
+    for bench in (Reception(), sending()):
+        while bench.strategy.ending is None:
+            bench.wait(7)
+            bench.come(PRINTED)
+        assert bench.strategy.ending is Ending.NOT_STARTED
+        assert bench.now_s == pytest.approx(120, abs=8)
+
+
+def test_what_a_program_prints_before_the_first_nak_is_handed_on() -> None:
+    bench = sending()
+    bench.come(PRINTED, NAK + PRINTED[:3])
+    assert bench.foreign == PRINTED + PRINTED[:3]
+    assert bench.sent == block(PROGRAM, 1)
+    bench.wait(0.2)
+    bench.come(b"noise")
+    assert bench.foreign == PRINTED + PRINTED[:3]
+
+
+def test_a_file_that_comes_as_it_is_ends_it_and_is_told_apart_from_damage() -> None:
+    bench = Reception()
+    bench.wait(3)
+    for at in range(0, len(PROGRAM), 50):
+        bench.come(PROGRAM[at : at + 50])
+    assert bench.wait_for_end(within_s=11) is Ending.UNLIKE
+    assert "not in blocks" in bench.strategy.account().detail
+    assert bench.file == b""
+
+
+def test_an_end_that_is_never_answered_is_told_apart_from_silence_in_the_middle() -> None:
+    bench = sending()
+    acknowledged(bench, BLOCKS)
+    assert bench.wait_for_end() is Ending.END_UNANSWERED
+    account = bench.strategy.account()
+    assert account.bytes == len(PROGRAM)
+    assert bench.strategy.proof is None

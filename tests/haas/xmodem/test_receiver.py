@@ -313,3 +313,15 @@ def test_a_byte_too_many_behind_the_last_block_makes_it_doubtful(receiver: Xmode
     receiver.receive(EOT)
     assert receiver.time_ran_out() == ACK
     assert receiver.doubtful_blocks == [1]
+
+
+def test_a_block_that_comes_again_without_end_ends_it(receiver: XmodemReceiver) -> None:
+    receiver.receive(block(FILE, 1))
+    for _ in range(ReceiverTimes().retry_limit):
+        assert receiver.receive(block(FILE, 1)) == ACK
+    assert receiver.receive(block(FILE, 2)) == ACK
+    for _ in range(ReceiverTimes().retry_limit):
+        assert receiver.receive(block(FILE, 2)) == ACK
+    assert receiver.receive(block(FILE, 2)) == CANCEL
+    assert kind_of(receiver) is FailureKind.TOO_MANY_REPEATS
+    assert "although it was acknowledged" in str(receiver.failure)

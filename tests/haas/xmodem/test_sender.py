@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from compax_aio.errors import InvalidCommandError, LinkProtocolError
-from compax_aio.haas.xmodem import FailureKind, SenderTimes, XmodemSender
+from compax_aio.haas.xmodem import FailureKind, ReceiverTimes, SenderTimes, XmodemSender
 from compax_aio.haas.xmodem.blocks import CANCEL, block
 
 ACK, NAK, CAN, EOT = b"\x06", b"\x15", b"\x18", b"\x04"
@@ -211,8 +211,35 @@ def test_babble_ends_it(has_begun: bool) -> None:
     sender = XmodemSender(FILE)
     if has_begun:
         sender.receive(NAK)
-    sender.receive(b"DPRNT " * 100)
+    sender.receive(b"\x02\x90\x81" * 200)
     assert kind_of(sender) is (FailureKind.FELL_SILENT if has_begun else FailureKind.NEVER_BEGUN)
+
+
+def test_a_program_that_prints_before_the_first_nak_ends_nothing_and_asks_for_no_crc() -> None:
+    sender = XmodemSender(FILE)
+    for _ in range(100):
+        sender.receive(b"COUNT 5\r\n")
+    assert not sender.is_over
+    assert sender.time_ran_out() == b""
+    assert kind_of(sender) is FailureKind.NEVER_BEGUN
+    assert "no NAK has come" in str(sender.failure)
+    sender = XmodemSender(FILE)
+    sender.receive(b"COUNT 5\r\n")
+    assert sender.receive(NAK) == block(FILE, 1)
+    sender.receive(b"COUNT 5\r\n" * 100)
+    assert kind_of(sender) is FailureKind.FELL_SILENT
+
+
+def test_an_answer_that_came_too_early_passes_for_one_to_the_last_block_only_after_a_long_silence() -> None:
+    sender = XmodemSender(FILE)
+    sender.receive(NAK)
+    for _ in range(sender.total_blocks - 1):
+        sender.receive(ACK)
+    assert sender.receive(ACK, still_leaving=True) == b""
+    assert sender.patience_s > 2 * ReceiverTimes().character_s  # who lost a byte of it says so by then
+    assert sender.receive(NAK) == block(FILE, sender.total_blocks)
+    assert sender.receive(ACK) == b""
+    assert sender.time_ran_out() == EOT
 
 
 def test_cancelling_tells_the_control_once(sender: XmodemSender) -> None:

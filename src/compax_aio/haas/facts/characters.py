@@ -33,6 +33,7 @@ __all__ = [
     "SPACE",
     "STX",
     "SUB",
+    "TEXT",
     "Character",
     "name_of",
 ]
@@ -106,6 +107,8 @@ LEADER: Final = frozenset({NUL, SPACE, DELETE})
 """What Setting 24 may have sent around the data: nothing of it is data (inferred)."""
 NEVER_IN_A_FILE: Final = frozenset({DC1, DC2, DC3, DC4, SUB})
 """The line takes them for signs of its own (inferred)."""
+TEXT: Final = bytes((CARRIAGE_RETURN, LINE_FEED, ord("\t"), *range(SPACE, DELETE)))
+"""What a block, or a line that a program prints, can have, with its end."""
 
 _LAST_CONTROL: Final = 0x1F
 

@@ -6,10 +6,11 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Final
 
+from ..facts.characters import TEXT
 from ..facts.xmodem import BLOCK_BYTES
 from ..xmodem import Failure, FailureKind, ReceiverTimes, SenderTimes, XmodemReceiver, XmodemSender
 from .account import Ending, LineAccount, Phase
-from .framing import FileEnd
+from .framing import FileEnd, FileStart
 from .notes import TransferBegan
 from .strategy import Patience, Strategy
 
@@ -23,14 +24,17 @@ _ENDINGS: Final[Mapping[FailureKind, Ending]] = MappingProxyType(
         FailureKind.CANCELLED_THERE: Ending.CANCELLED,
         FailureKind.CANCELLED_HERE: Ending.GIVEN_UP,
         FailureKind.OUT_OF_STEP: Ending.GARBLED,
-        FailureKind.END_UNKNOWN: Ending.WENT_SILENT,
+        FailureKind.END_UNKNOWN: Ending.END_UNANSWERED,
     }
 )
+_NO_BLOCKS: Final = "a file came, and not in blocks of XMODEM"
 
 
 class ReceiveByXmodem(Strategy):
     """
     Receives a file with XMODEM; what is handed on is the file byte for byte, without the fill of its last block.
+
+    Text that comes before the first block is what a program prints. If it is a file, the control sends as it is.
 
     Args:
         label: See :class:`Strategy`.
@@ -55,6 +59,9 @@ class ReceiveByXmodem(Strategy):
             eob=eob,
         )
         self._bytes = self._line_ends = 0
+        self._file_start = FileStart()
+        self._is_plain = False
+        """Whether a file came that is not in blocks."""
         self._file_end = FileEnd()
 
     @property
@@ -67,15 +74,21 @@ class ReceiveByXmodem(Strategy):
         self._has_moved = True
 
     def receive(self, data: bytes) -> bytes:
-        """Read *data*; all of it is the transfer's until it is over."""
+        """Read *data*; return what is printed in front of the first block, and what comes when it is over."""
         if self.ending is not None:
+            return data
+        if self.phase is Phase.WAIT_START and self._engine.is_between_blocks and not data.translate(None, TEXT):
+            self._is_plain |= self._file_start.find(data)[1] is not None
             return data
         self._answer(self._engine.receive(data))
         return b""
 
     def time_ran_out(self) -> None:
         """Ask for the block again, or take note of the end."""
-        self._answer(self._engine.time_ran_out())
+        if self._is_plain and self.phase is Phase.WAIT_START:
+            self._end(Ending.UNLIKE)
+        else:
+            self._answer(self._engine.time_ran_out())
 
     def _answer(self, answer: bytes) -> None:
         self._has_moved = True
@@ -120,7 +133,7 @@ class ReceiveByXmodem(Strategy):
             damaged_bytes=len(engine.doubtful_blocks),
             is_closed=self._file_end.is_closed,
             dropped_bytes=engine.fill_bytes,
-            detail=_detail_of(engine.failure),
+            detail=_NO_BLOCKS if self.ending is Ending.UNLIKE else _detail_of(engine.failure),
         )
 
 
@@ -157,11 +170,12 @@ class SendByXmodem(Strategy):
         self._answer(self._engine.begin())
 
     def receive(self, data: bytes) -> bytes:
-        """Read *data*; all of it is the transfer's until it is over."""
+        """Read *data*; return what is printed before the control asks for the first block, or comes at the end."""
         if self.ending is not None:
             return data
+        was_waiting = self.phase is Phase.WAIT_START
         self._answer(self._engine.receive(data, still_leaving=self._level.unsent() > 0))
-        return b""
+        return bytes(byte for byte in data if byte in TEXT) if was_waiting else b""
 
     def time_ran_out(self) -> None:
         """Write what is next, or take note that no answer came."""
@@ -169,7 +183,7 @@ class SendByXmodem(Strategy):
 
     def _answer(self, answer: bytes) -> None:
         engine = self._engine
-        self._has_moved = True
+        self._has_moved |= engine.has_begun  # what is printed meanwhile gives the operator no more time
         if self.phase is Phase.WAIT_START and engine.has_begun:
             self._notes.append(TransferBegan(self.label))
             self._enter(Phase.BODY)

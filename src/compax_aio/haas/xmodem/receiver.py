@@ -41,7 +41,7 @@ class ReceiverTimes:
         start_s: For the first block: until the operator has pressed SEND.
         character_s: For the rest of a block that has begun; so long must be silence after damage.
         end_s: For what may follow an EOT; if nothing does, it is one.
-        retry_limit: So often one block is asked for again.
+        retry_limit: So often one block is asked for again, and may come again.
     """
 
     nak_every_s: float = NAK_WAIT_S
@@ -99,6 +99,8 @@ class XmodemReceiver:
         """Bytes that could not be read since the last block."""
         self._retries = 0
         self._waited_s = 0.0
+        self._came_again = 0
+        """How often the last block came once more."""
         self._last = b""
         """The data of the last block."""
         self.sums_as_line_feed: bool | None = None
@@ -112,6 +114,11 @@ class XmodemReceiver:
     def is_over(self) -> bool:
         """Whether nothing is awaited any more."""
         return self._state is _State.OVER
+
+    @property
+    def is_between_blocks(self) -> bool:
+        """Whether nothing has come that may be a part of a block, or what is left of one."""
+        return not (self._held or self._noise)
 
     @property
     def received_bytes(self) -> int:
@@ -228,10 +235,15 @@ class XmodemReceiver:
         if frame[1] == (self.blocks + 1) & 0xFF:
             self._doubt_last(len(stray))
             self.blocks += 1
+            self._came_again = 0
             self._last = data
             self._put_out(data)
         elif self.blocks and frame[1] == self.blocks & 0xFF:
             self.repeats += 1
+            self._came_again += 1
+            if self._came_again > self._times.retry_limit:
+                detail = f"block {self.blocks} came {self._came_again} times more, although it was acknowledged"
+                return self._fail(FailureKind.TOO_MANY_REPEATS, detail)
             if data != self._last:
                 return self._fail(FailureKind.OUT_OF_STEP, f"block {self.blocks} came twice, with other bytes")
         else:

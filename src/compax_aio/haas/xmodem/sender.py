@@ -13,7 +13,7 @@ from enum import Enum
 from typing import Final
 
 from ...errors import InvalidCommandError, LinkProtocolError
-from ..facts.characters import ACK, CAN, EOT, NAK, SUB
+from ..facts.characters import ACK, CAN, EOT, NAK, SUB, TEXT
 from ..facts.xmodem import BLOCK_BYTES, CANCELS_TO_STOP, RETRIES
 from .blocks import CANCEL, CRC_REQUEST, block, block_count
 from .failures import Failure, FailureKind
@@ -34,7 +34,9 @@ class SenderTimes:
         start_s: For the first NAK: until the operator has pressed RECV.
         answer_s: For the answer to a block.
         end_s: For the answer to EOT, before it is sent again.
-        settle_s: For a second answer to a block that went out twice.
+        settle_s: For a second answer to a block that went out twice, or to one that had not left at the first one.
+        last_settle_s: The same behind the last block. Behind any other the next block shows who is at which; behind
+            this one comes the end. Who reads a block that lost a byte notices it by a second of silence.
         retry_limit: So often one block is repeated, and EOT.
         ends_sent: So often EOT is sent while nobody answers.
     """
@@ -43,6 +45,7 @@ class SenderTimes:
     answer_s: float = 30.0
     end_s: float = 10.0
     settle_s: float = 0.5
+    last_settle_s: float = 3.0
     retry_limit: int = RETRIES
     ends_sent: int = 3
 
@@ -96,7 +99,8 @@ class XmodemSender:
         self._cans = 0
         self._noise = 0
         self._ends_sent = 0
-        self._wants_crc = False
+        self._texts: set[int] = set()
+        """Characters of text that came before the first NAK: a program prints, or it is asked for a CRC."""
 
     # What it has come to --------------------------------------------------------------------------------------------
 
@@ -124,10 +128,11 @@ class XmodemSender:
     def patience_s(self) -> float:
         """How long :meth:`time_ran_out` waits, if nothing comes."""
         times = self._times
+        is_last = self.blocks >= self.total_blocks - 1
         return {
             _State.STARTING: times.start_s,
             _State.SENDING: times.answer_s,
-            _State.SETTLING: times.settle_s,
+            _State.SETTLING: times.last_settle_s if is_last else times.settle_s,
             _State.ENDING: times.end_s,
             _State.OVER: 0.0,
         }[self._state]
@@ -165,8 +170,9 @@ class XmodemSender:
         """Take note that :attr:`patience_s` has passed, and return what is to be written."""
         self._cans = 0
         if self._state is _State.STARTING:
-            seen = "it asks for a CRC (C), which this XMODEM has not" if self._wants_crc else "no NAK has come"
-            return self._fail(FailureKind.NEVER_BEGUN, seen, tells=self._wants_crc)
+            wants_crc = self._texts == {CRC_REQUEST}
+            seen = "it asks for a CRC (C), which this XMODEM has not" if wants_crc else "no NAK has come"
+            return self._fail(FailureKind.NEVER_BEGUN, seen, tells=wants_crc)
         if self._state is _State.SENDING:
             return self._fail(FailureKind.FELL_SILENT, f"block {self.blocks + 1} of {self.total_blocks} is unanswered")
         if self._state is _State.SETTLING:
@@ -198,8 +204,10 @@ class XmodemSender:
                 acks += 1
             elif byte == NAK:
                 naks += 1
+            elif self._state is _State.STARTING and byte in TEXT:
+                self._texts.add(byte)
+                self.strays += 1
             else:
-                self._wants_crc |= byte == CRC_REQUEST
                 self.strays += 1
                 self._noise += 1
         if acks or naks:
