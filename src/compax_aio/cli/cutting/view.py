@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import asyncio
-import sys
-from collections.abc import AsyncIterator, Iterator, Mapping
-from contextlib import asynccontextmanager
+from collections.abc import Iterator, Mapping
 from typing import Final
 
 from rich.console import Group
-from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
 from compax_aio.camm1.cut import CutProgress, CutState
 
-from ..outlets import is_held_up
-from ..printing import Printing, notes_console
+from ..live_picture import LivePicture
+from ..printing import Printing
 from .outline import written_time
 
 __all__ = ["CutView"]
@@ -36,12 +32,9 @@ _STATES: Final[Mapping[CutState, str]] = {
 _TOLD: Final = frozenset({"cutting", "paused", "operator pause", "finishing", "aborting"})
 """Without a terminal; others come and go many times."""
 _BAR_WIDTH: Final = 24
-_TICK_S: Final = 0.5
-_LEAST_PAUSE_S: Final = 0.05
-"""Between two pictures: nobody sees more, and lines are slow."""
 
 
-class CutView:
+class CutView(LivePicture):
     """
     Shows how a cut gets on.
 
@@ -55,48 +48,15 @@ class CutView:
     """
 
     def __init__(self, title: str, mm_per_step: float, printing: Printing) -> None:
+        super().__init__(printing)
         self._title = title
         self._mm = mm_per_step
-        self._printing = printing
         self.has_keys = False
-        self._live: Live | None = None
         self._state: CutState | None = None
         self._told: CutState | None = None
         self._progress: CutProgress | None = None
         self._got_at = 0.0
-        self._drawn_at = float("-inf")
         self._most_free = 0
-
-    def __enter__(self) -> CutView:
-        if not self._printing.json and sys.stderr.isatty():
-            console = notes_console()
-            console.soft_wrap = False
-            self._live = Live(console=console, auto_refresh=False, transient=True)
-            self._live.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.clear()
-
-    def clear(self) -> None:
-        """Show nothing any more, and leave the terminal as it was before."""
-        live, self._live = self._live, None
-        if live is not None:
-            live.stop()
-
-    @asynccontextmanager
-    async def ticking(self) -> AsyncIterator[None]:
-        """Let the time go on during a block, also where nothing else happens."""
-        ticker = asyncio.ensure_future(self._tick())
-        try:
-            yield
-        finally:
-            ticker.cancel()
-
-    async def _tick(self) -> None:
-        while True:
-            await asyncio.sleep(_TICK_S)
-            self._draw()
 
     def show(self, progress: CutProgress) -> None:
         """Show how the cut stands now."""
@@ -104,23 +64,14 @@ class CutView:
         self._most_free = max(self._most_free, progress.free_bytes or 0)
         is_news = progress.state != self._state
         self._state = progress.state
-        if self._live is None:
-            if progress.state in _TOLD and progress.state != self._told:
-                self._told = progress.state
-                self._printing.note(f"{self._title}: {_STATES[progress.state]}")
-        elif is_news or self._now() - self._drawn_at >= _LEAST_PAUSE_S:
-            self._draw()
+        if self._live is None and progress.state in _TOLD and progress.state != self._told:
+            self._told = progress.state
+            self._printing.note(f"{self._title}: {_STATES[progress.state]}")
+        self._draw(is_news=is_news)
 
-    def _draw(self) -> None:
-        if self._live is not None and self._progress is not None and not is_held_up(self._live.console.file):
-            self._drawn_at = self._now()
-            self._live.update(self._picture(self._progress), refresh=True)
-
-    @staticmethod
-    def _now() -> float:
-        return asyncio.get_running_loop().time()
-
-    def _picture(self, progress: CutProgress) -> Group:
+    def _picture(self) -> Group | None:
+        if (progress := self._progress) is None:
+            return None
         grid = Table.grid(padding=(0, 1))
         total = progress.bytes_total
         share = f"{100 * progress.bytes_sent / total:3.0f} %" if total else ""
