@@ -107,13 +107,14 @@ class ControlLine:
         profile = self.profile
         assert profile.synchronization is not None  # it is refused before
         send = drip_feed if kind == "drip feed" else send_file
+        heeds_signs = profile.synchronization != "rts/cts"  # with wires the port stops between two bytes
         return send(
             profile.synchronization,
             label,
             data,
             patience=patience,
             eob=profile.eob_bytes,
-            most_unsent_bytes=self.settings.most_unsent_bytes,
+            most_unsent_bytes=self.settings.most_unsent_bytes if heeds_signs else None,
             waits_for_start=profile.says_when_ready,
         )
 

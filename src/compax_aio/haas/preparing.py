@@ -34,7 +34,7 @@ _KNOWN: Final = (
     "Parameters take effect even if the control raises an alarm on them, and wrong ones can damage the machine. Make "
     "sure that they are of this very control and as it has sent them, and pass i_know_it_takes_effect=True"
 )
-_NEVER: Final = bytes(NEVER_IN_A_FILE) + bytes(range(0x80, 0x100))
+_MAY_BE: Final = bytes(byte for byte in range(0x80) if byte not in NEVER_IN_A_FILE)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,8 +81,7 @@ def prepare_programs(
     built = build_program_file(programs, eob=profile.eob, o_digits=profile.o_digits, for_dnc=for_dnc)
     if kind == "program" and len(built.programs) > 1:
         raise InvalidCommandError(f"there are {len(built.programs)} programs in it", hint="use send_programs()")
-    if found := set(built.data) & set(_NEVER):
-        raise _never(found)
+    _refuse_signs(built.data)
     _refuse_large(len(built), max_bytes)
     return Prepared(kind=kind, data=built.data, file=built, warnings=_warnings_of(problems))
 
@@ -116,8 +115,7 @@ def prepare_data(
     problems = check_data_file(file, force=force)
     raise_for_errors(problems)
     payload = file.payload
-    if found := set(payload) & set(_NEVER):
-        raise _never(found)
+    _refuse_signs(payload)
     _refuse_large(len(payload), max_bytes)
     if payload[-1:] not in LINE_ENDS:  # never empty: it ends with %
         payload += profile.eob_bytes
@@ -182,12 +180,13 @@ def _refuse_doubles(programs: list[ProgramFile]) -> None:
         seen.add(number)
 
 
-def _never(found: set[int]) -> InvalidCommandError:
-    said = ", ".join(f"{each:02X}" for each in sorted(found)[:10])
-    return InvalidCommandError(
-        f"it has bytes that mean something else on the line, or cannot go over it: {said} (hexadecimal)",
-        hint="take them out; a file that came so is damaged",
-    )
+def _refuse_signs(data: bytes) -> None:
+    if found := data.translate(None, _MAY_BE):
+        said = ", ".join(f"{each:02X}" for each in sorted(set(found))[:10])
+        raise InvalidCommandError(
+            f"it has bytes that mean something else on the line, or cannot go over it: {said} (hexadecimal)",
+            hint="take them out; a file that came so is damaged",
+        )
 
 
 def _warnings_of(problems: Iterable[Problem]) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from ..motion.events import DriveEvent
 from ..severity import Severity
 from .archive import Archive
 from .checking import check_data_file
+from .facts.characters import TEXT
 from .facts.data_files import DataKind
 from .language.data_file import DataFile, parse_data_file
 from .language.program_file import ProgramFile, parse_program_file
@@ -25,6 +26,7 @@ from .verifying import Verified, verified_received
 __all__ = ["Receiving", "read_file"]
 
 _AGAIN: Final = " once more, to be compared"
+_MOST_ODD_BYTES: Final = 10_000
 
 
 class Receiving(Transferring[Received]):
@@ -90,7 +92,7 @@ class Receiving(Transferring[Received]):
             verified=verified,
             archive=place,
             duration_s=self._loop.time() - self._began_at,
-            warnings=warnings,
+            warnings=(*warnings, *self._warnings(on_line)),
         )
 
     def _came(self) -> bytes:
@@ -124,7 +126,8 @@ class Receiving(Transferring[Received]):
         if damage:
             raise self._reports.damaged(damage, self.account())
         if not on_line.is_closed:
-            raise self._reports.unlike("it does not end with %, so something may be missing", self.account())
+            why = on_line.detail or "it does not end with %, so something may be missing"
+            raise self._reports.unlike(why, self.account())
 
     async def _read(self, data: bytes) -> tuple[ProgramFile | DataFile, tuple[str, ...]]:
         try:
@@ -137,7 +140,7 @@ class Receiving(Transferring[Received]):
         data, on_line = await self._receive(_AGAIN)
         self._refuse_damage(self._damage_of(on_line), on_line)
         again, _ = await self._read(data)
-        verified = verified_received(file.payload, again.payload)
+        verified = await asyncio.to_thread(verified_received, file.payload, again.payload)
         if not verified:
             error = self._reports.unequal(
                 f"the {self.kind} came twice, and not the same: {verified.proves}",
@@ -147,6 +150,18 @@ class Receiving(Transferring[Received]):
             error.verified = verified  # type: ignore[attr-defined]
             raise error
         return verified
+
+    def _warnings(self, on_line: LineAccount) -> tuple[str, ...]:
+        warnings = []
+        if count := on_line.signs_inside:
+            warnings.append(
+                f"{count} {'sign' if count == 1 else 'signs'} (NUL, DEL, DC1 to DC4) came inside the file, first at "
+                f"offset {on_line.sign_offsets[0]}, and {'was' if count == 1 else 'were'} left out: if the line is "
+                "disturbed, a character is missing there; receive it twice (verify)"
+            )
+        if self._line.profile.synchronization == "dc codes" and not on_line.has_dc4:
+            warnings.append("the control has not said that this was all (DC4): its end is known by silence behind a %")
+        return tuple(warnings)
 
     def _proof_of(self, on_line: LineAccount) -> str:
         if on_line.blocks:
@@ -181,6 +196,11 @@ def _programs(data: bytes, kind: Kind, profile: Profile) -> tuple[ProgramFile, t
     warnings = []
     if kind == "program" and len(file.programs) > 1:
         warnings.append(f"{len(file.programs)} programs came, and one was expected: was ALL chosen at the control?")
+    if odd := file.payload.translate(None, TEXT):
+        said = ", ".join(f"{each:02X}" for each in sorted(set(odd[:_MOST_ODD_BYTES]))[:10])
+        warnings.append(
+            f"{len(odd)} bytes in it are no text of a program: {said} (hexadecimal); is the line disturbed?"
+        )
     if len(file.percent_lines) > 2:  # one pair
         warnings.append("there are several pairs of % in it: to send it back, they must be one")
     return file, tuple(warnings)

@@ -87,9 +87,11 @@ class Sending(Transferring[Sent]):
         warnings = []
         if self._line.profile.synchronization == "dc codes" and proof != "reader off seen":
             warnings.append("the control has not said that it has read the last % (DC3): look at its screen")
-        if on_line.held_bytes:
+        if on_line.detail:
+            warnings.append(f"{on_line.detail}: look at its screen whether it has read anything")
+        if count := on_line.held_bytes:
             warnings.append(
-                f"{on_line.held_bytes} bytes left after the control had said stop, at most "
+                f"{count} {'byte' if count == 1 else 'bytes'} left after the control had said stop, at most "
                 f"{on_line.most_held_bytes} at once"
             )
         return tuple(warnings)

@@ -94,7 +94,7 @@ class TransferAccount:
     damage_offsets: tuple[int, ...] = ()
     """Where in the file a byte came damaged, the first times."""
     archive: Path | None = None
-    """Where the bytes are; ``*.incomplete`` unless the transfer ended well."""
+    """Where the bytes are; ``*.incomplete`` until they have all come and were found to be what they should be."""
 
     @property
     def offset(self) -> int:
@@ -144,7 +144,7 @@ class Received:
     file: ProgramFile | DataFile
     """The same, read; ``bytes(file)`` is *data*."""
     proof: str
-    """What has shown the end of the file: ``"DC4"``, ``"xmodem EOT"``, ``"silence after %"``."""
+    """What has shown the end of the file: ``"DC4 seen"``, ``"xmodem EOT"``, ``"silence after %"``."""
     damage: Damage | None
     """None: nothing on this line tells damage, and there may be some; see :attr:`verified`."""
     verified: Verified | None

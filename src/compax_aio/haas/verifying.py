@@ -18,6 +18,7 @@ ONLY_ON_SCREEN: Final = (
 )
 _DATA_ONLY_ON_SCREEN: Final = "; data are loaded even where there is an alarm"
 _MOST_TOLD: Final = 5
+_PIECE_BYTES: Final = 4096
 _AFTER_FEEDING: Final = "whether the machine has run it to its end, and the alarms; nothing of it is stored"
 _AFTER_READING_BACK: Final = "alarms, and whether the machine shall work with it"
 
@@ -47,7 +48,7 @@ def only_on_screen(kind: Kind, *, is_read_back: bool) -> str:
 
 
 def verified_received(first: bytes, second: bytes) -> Verified:
-    """Compare what came with what came at the second time: they must be the same bytes."""
+    """Compare what came with what came the second time, byte for byte; for a thread, for it may be large."""
     if first == second:
         return Verified(
             equal="byte for byte",
@@ -78,7 +79,10 @@ def verified_sent(sent: ProgramFile | DataFile, back: ProgramFile | DataFile) ->
 
 
 def _place(first: bytes, second: bytes) -> str:
-    for at, (one, other) in enumerate(zip(first, second, strict=False)):
-        if one != other:
-            return f"from byte {at} on: {one:02X}, and then {other:02X} (hexadecimal)"
+    shorter = min(len(first), len(second))
+    for begin in range(0, shorter, _PIECE_BYTES):
+        end = min(begin + _PIECE_BYTES, shorter)
+        if first[begin:end] != second[begin:end]:
+            at = next(each for each in range(begin, end) if first[each] != second[each])
+            return f"from byte {at} on: {first[at]:02X}, and then {second[at]:02X} (hexadecimal)"
     return f"in length: {len(first)} bytes, and then {len(second)}"

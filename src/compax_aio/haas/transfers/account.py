@@ -77,6 +77,8 @@ class LineAccount:
         is_closed: Whether the last line that has come, and has anything, is a percent sign: what is received is whole.
         detail: What is known besides of how it ended; a clause for a person.
         dropped_bytes: Signs of the handshake and leader that came between and are no part of the file.
+        signs_inside: How many of these came in the middle of the file, where none should be.
+        sign_offsets: Where in the file; the first ones.
     """
 
     label: str
@@ -99,6 +101,8 @@ class LineAccount:
     has_dc2: bool = False
     has_dc4: bool = False
     dropped_bytes: int = 0
+    signs_inside: int = 0
+    sign_offsets: tuple[int, ...] = ()
     is_closed: bool = False
     detail: str = ""
 

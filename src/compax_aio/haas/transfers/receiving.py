@@ -18,6 +18,15 @@ _NO_PART_OF_IT: Final = bytes((NUL, DC1, DC2, DC3, DC4, DELETE))
 _BEHIND_DC4_S: Final = 0.3
 """Nothing but blank tape comes behind DC4, unless another file does."""
 _MOST_OFFSETS: Final = 100
+_MOST_PRINTS: Final = 8
+"""So often the operator has his time anew because what looked like a beginning was printed."""
+_MOST_TAIL_BYTES: Final = 4096
+"""So much blank tape behind the file is waited for."""
+_BLANKS: Final = b" \t\r\n"
+_ONLY_PERCENT: Final = (
+    "nothing but a % came: was SEND pressed before this listened, so that it is the end of a file whose beginning is "
+    "lost?"
+)
 
 
 class ReceiveFile(Strategy):
@@ -27,6 +36,7 @@ class ReceiveFile(Strategy):
     It begins with the first line that begins with a percent sign, and ends when a line with a percent sign alone is
     behind, and then silence. DC2 and DC4 around it are expected by nobody and heeded by all: DC4 makes the silence
     short. What is handed on is the file byte for byte, without the signs of the handshake and without blank tape.
+    Where such a sign stands in the middle of the file, it may have been another character once, and is told.
 
     Args:
         label: See :class:`Strategy`.
@@ -48,6 +58,11 @@ class ReceiveFile(Strategy):
         self._file_end = FileEnd()
         self._bytes = self._carriage_returns = self._line_feeds = self._dropped = 0
         self._has_dc2 = self._has_dc4 = False
+        self._prints = self._tail_bytes = 0
+        self._text_bytes = 0
+        """Of the file, blanks and ends of blocks left out."""
+        self._signs_inside = 0
+        self._sign_offsets: list[int] = []
         self._damaged = 0
         self._damage_offsets: list[int] = []
 
@@ -79,18 +94,33 @@ class ReceiveFile(Strategy):
                 foreign += self._read(data[begin:at])
                 begin = at + 1
                 self._dropped += 1
+                self._note_inside()
                 self._heed(byte)
         return foreign + self._read(data[begin:])
 
+    def _note_inside(self) -> None:
+        """Take note of a sign where none should be: it may have been a character of the file, which is lost then."""
+        if self.phase is Phase.BODY:
+            self._signs_inside += 1
+            if len(self._sign_offsets) < _MOST_OFFSETS:
+                self._sign_offsets.append(self._bytes)
+
     def _heed(self, sign: int) -> None:
         if sign == DC2 and self.phase is Phase.WAIT_START:
-            self._has_dc2 = self._has_moved = True
+            if self._prints < _MOST_PRINTS:
+                self._has_dc2 = self._has_moved = True
         elif sign == DC4 and self.phase is Phase.WAIT_START:
-            self._has_dc2 = False  # that was no file, but what a program prints between POPEN and PCLOS
-            self._has_moved = True
+            self._forget_dc2()
         elif sign == DC4 and self.phase is not Phase.DONE:
             self._has_dc4 = True
             self._enter(Phase.TAIL)
+
+    def _forget_dc2(self) -> None:
+        """Take note that no file has begun, but what a program prints behind POPEN: the operator has his time anew."""
+        if self._has_dc2:
+            self._has_dc2 = False
+            self._prints += 1
+            self._has_moved = True
 
     def _read(self, data: bytes) -> bytes:
         if not data or self.ending is not None:
@@ -99,6 +129,8 @@ class ReceiveFile(Strategy):
             self._take(data)
             return b""
         foreign, begun = self._start.find(data)
+        if foreign.strip(_BLANKS):
+            self._forget_dc2()
         if begun is not None:
             self._notes.append(TransferBegan(self.label))
             self._enter(Phase.BODY)
@@ -116,8 +148,11 @@ class ReceiveFile(Strategy):
         is_more = bool(data.strip())
         if is_more:
             self._has_dc4 = False  # what looked like one was noise, or it was that of another file
+            self._text_bytes += len(data.translate(None, _BLANKS))
+        self._tail_bytes = 0 if is_more else self._tail_bytes + len(data)
         if self._file_end.is_closed:
-            self._enter(Phase.TAIL)
+            if self.phase is not Phase.TAIL or self._tail_bytes <= _MOST_TAIL_BYTES:
+                self._enter(Phase.TAIL)
         elif self.phase is Phase.BODY or is_more:
             self._enter(Phase.BODY)
         self._sink(data)
@@ -153,4 +188,7 @@ class ReceiveFile(Strategy):
             has_dc4=self._has_dc4,
             is_closed=self.is_closed,
             dropped_bytes=self._dropped,
+            signs_inside=self._signs_inside,
+            sign_offsets=tuple(self._sign_offsets),
+            detail=_ONLY_PERCENT if self.ending is not None and self._text_bytes == 1 else "",
         )

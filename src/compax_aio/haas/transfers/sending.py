@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from typing import Any, Final
 
-from ..facts.characters import DC1, DC3, PERCENT
+from ..facts.characters import DC1, DC3, NAK, PERCENT
 from .account import Ending, LineAccount, Phase, Proof
 from .notes import TransferBegan, TransferHeld, TransferStillHeld, TransferWentOn
 from .strategy import Patience, Strategy
@@ -18,7 +18,11 @@ _LONGEST_LOOK_S: Final = 0.1
 """What does not leave is looked at so often, at least."""
 _SETTLE_S: Final = 0.5
 """An Xon that comes so soon behind the last DC3 shows that this was an Xoff."""
+_MOST_SETTLES: Final = 64
+"""So often a control whose reader goes on and off at the end is waited for."""
 _MOST_OFFSETS: Final = 100
+_FEWEST_NAKS: Final = 2
+_ASKS_FOR_BLOCKS: Final = "it has sent NAK again and again, as with XMODEM (Setting 14)"
 
 
 class SendFile(Strategy):
@@ -73,6 +77,7 @@ class SendFile(Strategy):
         self._seen_unsent = 0
         self._stuck_s = 0.0
         """For so long nothing has left of what was written."""
+        self._naks = 0
         self._lines = self._counted = 0
         """Ends of blocks among the bytes that were counted."""
 
@@ -112,6 +117,7 @@ class SendFile(Strategy):
 
     def receive(self, data: bytes) -> bytes:
         """Heed the signs in *data*; return the rest."""
+        self._naks += data.count(NAK)
         if not self.heeds_signs:
             return data
         for byte in data:
@@ -241,6 +247,7 @@ class SendFile(Strategy):
             hold_offsets=tuple(self._hold_offsets),
             held_bytes=self._held_bytes,
             most_held_bytes=self._most_held_bytes,
+            detail=_ASKS_FOR_BLOCKS if self._naks >= _FEWEST_NAKS else "",
         )
 
 
@@ -265,12 +272,13 @@ class SendByDcCodes(SendFile):
         super().__init__(label, patience, data, **more)
         self._behind_percent = len(data) - 1 - data.rfind(PERCENT)
         self._is_reader_off = False
+        self._settles = 0
 
     def _off(self) -> None:
         # The end of the block with the last % may be still to be written then: it follows all the same.
         if self.phase in {Phase.BODY, Phase.TAIL} and self.left_bytes >= len(self._data) - self._behind_percent:
             self._is_reader_off = True
-            self._settle(_SETTLE_S)
+            self._settle(self._settle_s)
         else:
             super()._off()
 
@@ -281,14 +289,21 @@ class SendByDcCodes(SendFile):
         else:
             super()._on()
 
+    @property
+    def _settle_s(self) -> float:
+        """How long no DC1 must come: one that has held the line before may take its time until it goes on."""
+        longest_s = self.patience.reader_off_s if self._holds else self.patience.tail_s
+        return max(_SETTLE_S, longest_s)
+
     def _settle(self, pause_s: float) -> None:
         """Wait so long, if all has left."""
-        if self.phase is Phase.TAIL and not self._is_leaving:
+        if self.phase is Phase.TAIL and not self._is_leaving and self._settles < _MOST_SETTLES:
+            self._settles += 1
             self._pause_s = pause_s
             self._has_moved = True
 
     def _all_has_left(self) -> None:
-        self._pause_s = _SETTLE_S if self._is_reader_off else self.patience.reader_off_s
+        self._pause_s = self._settle_s if self._is_reader_off else self.patience.reader_off_s
 
     def _end_tail(self) -> None:
         proof: Proof = "reader off seen" if self._is_reader_off else "left the line"
