@@ -14,7 +14,7 @@ from .facts.characters import NEVER_IN_A_FILE, PERCENT, name_of
 from .facts.data_files import CHECKSUM_NUMBER, DATA_FILES, LAST_NUMBER, DataKind, Presence
 from .facts.programs import DNC_MAX_LINE_NUMBER, LONG_BLOCK_BYTES
 from .language.data_file import DataFile, DataLine, fault_of, kind_of_data, lines_of_data
-from .language.lines import LINE_ENDS, SKIPPED, Lines, as_bytes
+from .language.lines import LINE_ENDS, SKIPPED, Lines, as_bytes, matches
 from .language.program_file import Program, ProgramFile, parse_program_file
 from .problems import Finding, Kind, Problem, raise_for_errors, some, told
 from .profiles import CLASSIC, Profile
@@ -92,7 +92,7 @@ _LINE_NUMBER: Final = re.compile(rb"(?<![A-Z0-9#.\[])N[ \t]*0*([1-9][0-9]{5,})")
 def _without_comments(body: bytes) -> bytes:
     """Put blanks in their place; here and not by sub(), which keeps each piece for itself until the end."""
     masked = bytearray(body)
-    for match in _COMMENT.finditer(body):
+    for match in matches(_COMMENT, body):
         masked[match.start() : match.end()] = b" " * len(match[0])
     return bytes(masked)
 
@@ -128,8 +128,8 @@ def _at(kind: Kind, severity: Severity, what: str, hint: str, begin: int) -> Cal
 
 
 def _about_signs(body: bytes, begin: int) -> Iterator[Finding]:
-    yield from some(() if body.isascii() else _EIGHT_BITS.finditer(body), lambda match: _eight_bits(match, begin))
-    yield from some(_CONTROL.finditer(body), lambda match: _control(match, begin))
+    yield from some(() if body.isascii() else matches(_EIGHT_BITS, body), lambda match: _eight_bits(match, begin))
+    yield from some(matches(_CONTROL, body), lambda match: _control(match, begin))
     yield from some(_places_of(b"\t", body), _at(Kind.TAB, Severity.WARNING, "a tab", "write blanks", begin))
 
 
@@ -172,18 +172,18 @@ def _places_of(what: bytes, body: bytes) -> Iterator[int]:
 
 
 def _percents_within(body: bytes) -> Iterator[int]:
-    for line in _WITH_PERCENT.finditer(body):
+    for line in matches(_WITH_PERCENT, body):
         if line[0].strip(SKIPPED) != b"%":
             yield from (line.start() + at for at in _places_of(b"%", line[0]))
 
 
 def _about_words(masked: bytes, body: bytes, begin: int) -> Iterator[Finding]:
-    yield from some(_LOWER_CASE.finditer(masked), lambda match: _lower_case(match, begin))
+    yield from some(matches(_LOWER_CASE, masked), lambda match: _lower_case(match, begin))
     yield from some(
-        (match.start() for match in _COMMENT.finditer(body) if not match[0].endswith(b")")),
+        (match.start() for match in matches(_COMMENT, body) if not match[0].endswith(b")")),
         _at(Kind.COMMENT, Severity.WARNING, "a comment that does not end in its line", "close it with )", begin),
     )
-    yield from some(_LONG.finditer(body), lambda match: _long(match, begin))
+    yield from some(matches(_LONG, body), lambda match: _long(match, begin))
 
 
 def _lower_case(match: re.Match[bytes], begin: int) -> Finding:
@@ -200,7 +200,7 @@ def _long(match: re.Match[bytes], begin: int) -> Finding:
 
 
 def _about_line_numbers(masked: bytes, begin: int) -> Iterator[Finding]:
-    high = (match for match in _LINE_NUMBER.finditer(masked) if int(match[1][:9]) > DNC_MAX_LINE_NUMBER)
+    high = (match for match in matches(_LINE_NUMBER, masked) if int(match[1][:9]) > DNC_MAX_LINE_NUMBER)
     yield from some(high, lambda match: _line_number(match, begin))
 
 

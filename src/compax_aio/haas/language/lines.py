@@ -6,13 +6,14 @@ import re
 from array import array
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
+from itertools import islice
 from typing import Final, overload
 
 from ...errors import InvalidCommandError
 from ..facts.characters import DC1, DC2, DC3, DC4, DELETE, NUL, SPACE, SUB
 from ..facts.eob import EobPattern
 
-__all__ = ["IGNORED", "LINE_ENDS", "SKIPPED", "LineView", "Lines", "as_bytes", "eob_of"]
+__all__ = ["IGNORED", "LINE_ENDS", "SKIPPED", "LineView", "Lines", "as_bytes", "eob_of", "matches"]
 
 IGNORED: Final = bytes((NUL, DC1, DC2, DC3, DC4, SUB, DELETE))
 """Leader, reader, punch, fill: around the data they mean nothing, and within a block they are no text of it."""
@@ -29,6 +30,7 @@ _DOUBLED: Final = {
 _SINGLE_CR: Final = re.compile(rb"(?<!\r)\r(?:\r\r)*(?!\r)")
 _SINGLE_LF: Final = re.compile(rb"(?<!\n)\n(?:\n\n)*(?!\n)")
 _RUN_OF_ENDS: Final = re.compile(rb"[\r\n]+")
+_PIECE_BYTES: Final = 1 << 16
 _SMALL: Final = 1 << 32
 _MOST_PERCENTS: Final = 100_000
 """A pair for each program that there can be is fewer by far."""
@@ -53,6 +55,26 @@ def as_bytes(text: str | bytes | bytearray | memoryview) -> bytes:
         ) from None
 
 
+def matches(
+    pattern: re.Pattern[bytes], data: bytes | bytearray, begin: int = 0, end: int | None = None
+) -> Iterator[re.Match[bytes]]:
+    """
+    Find a pattern that reaches beyond no line, as ``pattern.finditer()`` does, but in pieces of whole lines.
+
+    While a pattern is looked for, Python lets no other thread have its turn, so a file of megabytes that does not have
+    it would hold up the event loop. A line of more than 64 KiB, which no control has, may be cut.
+    """
+    end = len(data) if end is None else end
+    while begin < end:
+        behind = min(begin + _PIECE_BYTES, end)
+        if behind < end and (run := _RUN_OF_ENDS.search(data, behind, min(behind + _PIECE_BYTES, end))) is not None:
+            behind = run.end()
+            while behind < end and data[behind] in LINE_ENDS:
+                behind += 1
+        yield from pattern.finditer(data, begin, behind)
+        begin = behind
+
+
 def eob_of(data: bytes) -> EobPattern | None:
     """
     Return the pattern that all lines of *data* end with; None if they are mixed, or there is none.
@@ -69,7 +91,7 @@ def eob_of(data: bytes) -> EobPattern | None:
     single, one, two = (
         (_SINGLE_CR, EobPattern.CR, EobPattern.CR_CR) if returns else (_SINGLE_LF, EobPattern.LF, EobPattern.LF_LF)
     )
-    has_several = len(_RUN_OF_ENDS.findall(data)) > 1
+    has_several = len(list(islice(_RUN_OF_ENDS.finditer(data), 2))) > 1
     return two if has_several and single.search(data) is None else one
 
 
@@ -216,7 +238,7 @@ def _told_apart(found: EobPattern, told: EobPattern) -> EobPattern:
 def _offsets(data: bytes, end: re.Pattern[bytes]) -> Sequence[int]:
     """Return where each line begins, and how many bytes there are."""
     offsets = array("I" if len(data) < _SMALL else "Q", [0])
-    offsets.extend(match.end() for match in end.finditer(data))
+    offsets.extend(match.end() for match in matches(end, data))
     if offsets[-1] != len(data):
         offsets.append(len(data))
     return offsets

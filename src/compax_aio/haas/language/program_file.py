@@ -12,7 +12,7 @@ from typing import Final, NamedTuple, overload
 from ...errors import InvalidCommandError
 from ..facts.eob import EobPattern
 from ..facts.programs import MAX_NAME_DIGITS
-from .lines import IGNORED, LINE_ENDS, SKIPPED, Lines, as_bytes
+from .lines import IGNORED, LINE_ENDS, SKIPPED, Lines, as_bytes, matches
 
 __all__ = ["Block", "Blocks", "Name", "Program", "ProgramFile", "name_of_line", "parse_program_file"]
 
@@ -284,7 +284,7 @@ def _programs_between(lines: Lines, begin: int, end: int) -> Iterator[Program]:
 def _borders(lines: Lines, begin: int, end: int) -> Iterator[int]:
     """Give the index of the first line of each program, and that behind the last one."""
     is_first = True
-    for match in _FIRST_SIGN.finditer(lines.data, lines.offsets[begin], lines.offsets[end]):
+    for match in matches(_FIRST_SIGN, lines.data, lines.offsets[begin], lines.offsets[end]):
         at = bisect_left(lines.offsets, match.start())
         if is_first and not lines.are_blank(begin, at):
             yield begin
