@@ -128,8 +128,9 @@ async def test_a_defect_lets_nobody_wait_for_ever(defect: Exception) -> None:
     device.fails_with = defect
     watch = device.watch()
     (task,) = asking()
-    with pytest.raises(type(defect)):
-        await anext(watch)
+    async with asyncio.timeout(60):
+        with pytest.raises(type(defect)):
+            await anext(watch)
     assert task.exception() is defect
 
 
