@@ -126,7 +126,7 @@ async def test_a_terminal_that_is_shut_ends_a_transfer(
 async def test_parameters_are_sent_when_the_word_is_typed(open_terminal: Open, tmp_path: Path) -> None:
     path = tmp_path / "parameters.txt"
     path.write_text("%\nN0 V1\nN1 V5\n%\n")
-    control = SimulatedControl(Knobs(profile="dc codes"))
+    control = SimulatedControl(Knobs(profile="dc codes", baudrate=9600))
     words = (str(path), "--profile", "classic-dc-codes", "--i-know-parameters-take-effect")
     async with serve_tcp(control) as url:
         for typed, code in (("yes\r", 1), ("PARAMETERS\r", 0)):
@@ -142,7 +142,7 @@ async def test_parameters_are_sent_when_the_word_is_typed(open_terminal: Open, t
 
 
 async def test_a_drip_feed_is_asked_about(open_terminal: Open, program: Path) -> None:
-    control = SimulatedControl(Knobs(profile="dc codes"))
+    control = SimulatedControl(Knobs(profile="dc codes", baudrate=9600))
     async with serve_tcp(control) as url:
         for typed, code in (("\r", 1), ("y\r", 0)):
             terminal = open_terminal("send", url, str(program), "--dnc", "--profile", "classic-dc-codes")

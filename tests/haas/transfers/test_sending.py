@@ -209,6 +209,20 @@ def test_a_dc3_that_comes_before_the_percent_sign_has_left_proves_nothing() -> N
     assert bench.strategy.proof == "left the line"
 
 
+def test_a_last_dc3_from_a_line_that_is_faster_than_is_known_holds_the_end_for_a_moment_and_proves_nothing() -> None:
+    data = b"%\r\nN1 V1\r\n%" + b"\r\n" * 4
+    bench = sending("dc codes", data)
+    assert b"V1\r\n%" in bench.sent  # written, and reckoned to be on its way
+    assert bench.sent != data
+    bench.come(DC3)
+    assert bench.strategy.account().is_held
+    bench.wait(4)
+    assert bench.sent != data
+    assert bench.wait_for_end(within_s=8) is Ending.COMPLETE
+    assert bench.sent == data
+    assert bench.strategy.proof == "left the line"
+
+
 def test_a_dc3_behind_the_end_that_a_dc1_follows_was_an_xoff_and_the_last_one_is_awaited() -> None:
     bench = sending("dc codes")
     bench.wait(len(PROGRAM) / RATE + 0.2)

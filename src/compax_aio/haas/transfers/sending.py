@@ -282,6 +282,28 @@ class SendByDcCodes(SendFile):
         else:
             super()._off()
 
+    @property
+    def _has_all_but_the_end(self) -> bool:
+        """Whether nothing is left to write but the end of the block with the last ``%``."""
+        return self._written >= len(self._data) - self._behind_percent
+
+    def _stay_held(self) -> None:
+        super()._stay_held()
+        if self._has_all_but_the_end:
+            self._pause_s = min(self._pause_s, self._settle_s)
+
+    def time_ran_out(self) -> None:
+        """
+        Write more, or take note that the control does not go on.
+
+        Where the line is faster than is known here, the last DC3 comes before the ``%`` is reckoned to have left, and
+        looks like an Xoff that no Xon follows. The end of the block is written then, and nothing is proved.
+        """
+        if self.phase is Phase.BODY and self._is_held and self._has_all_but_the_end:
+            self._on()
+        else:
+            super().time_ran_out()
+
     def _on(self) -> None:
         if self._is_reader_off and self.phase is not Phase.DONE:
             self._is_reader_off = False
