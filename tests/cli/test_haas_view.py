@@ -122,6 +122,15 @@ async def test_the_rate_is_that_of_the_last_seconds(open_terminal: Opener) -> No
     assert seen(terminal).rindex(" 0 bytes/s") > seen(terminal).rindex("100 bytes/s")
 
 
+async def test_before_anything_goes_there_is_no_rate(open_terminal: Opener) -> None:
+    terminal = open_terminal("stderr")
+    with TransferView("job.nc", Printing()) as view:
+        view.show(progress("starting", 0))
+        await asyncio.sleep(5)
+        view.show(progress("under way", 0))
+    assert "bytes/s" not in seen(terminal)
+
+
 async def test_a_second_look_is_not_counted(open_terminal: Opener) -> None:
     open_terminal("stderr")
     with TransferView("job.nc", Printing()) as view:

@@ -130,7 +130,7 @@ class TransferView(LivePicture):
         yield f"{progress.bytes:,}{of} bytes, {progress.lines:,} lines"
         if progress.blocks:
             yield f"{progress.blocks:,} blocks"
-        if (rate := self._rate()) is not None:
+        if progress.bytes and (rate := self._rate()) is not None:
             yield f"{rate:,.0f} bytes/s"
         if progress.held_s:
             yield f"held for {written_time(progress.held_s)} in all"
