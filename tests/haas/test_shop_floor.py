@@ -259,6 +259,58 @@ def _drop_everything_when(far: SimulatedControl, condition: Any) -> None:
     look()
 
 
+# A file that was not sent to its end ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("profile", [CLASSIC, CLASSIC_RTS_CTS])
+async def test_who_sends_behind_a_file_that_was_given_up_is_told_that_the_control_may_take_it_for_the_rest(
+    profile: Any,
+) -> None:
+    told: list[str] = []
+    async with bench(profile) as b:
+        b.far.memory.programs.clear()
+        b.far.press_recv()
+        transfer = b.control.send_program(program_of(3000))
+        await asyncio.sleep(0.5)
+        transfer.cancel()
+        await asyncio.sleep(2)
+        sent = await b.control.send_program(PROGRAM, on_operator=told.append)
+        assert b.far.memory.programs["O01234"] != PROGRAM  # although its screen says RS232 DONE
+        assert any("was not sent to its end" in each for each in sent.warnings)
+        assert "press RESET first" in told[0]
+        b.far.press_recv()
+        sent = await b.control.send_program(PROGRAM, on_operator=told.append)
+        assert b.far.memory.programs["O01234"] == PROGRAM
+        assert sent.warnings == ()
+        assert "RESET" not in told[1]
+
+
+async def test_a_line_that_is_lost_and_a_file_that_comes_count_too() -> None:
+    async with bench() as b:
+        b.far.press_recv()
+        transfer = b.control.send_program(program_of(3000))
+        await asyncio.sleep(0.5)
+        b.lose_line()
+        await ending(transfer)
+        await until(lambda: b.control.is_open)
+        b.far.press_reset()
+        await asyncio.sleep(1)
+        assert b.control._line.may_wait_for_rest
+        await b.control.receive_program(on_operator=b.hand(("send", "O00010")))
+        assert not b.control._line.may_wait_for_rest  # who sends does not wait
+
+
+async def test_who_was_told_by_xmodem_waits_for_no_rest() -> None:
+    async with bench(CLASSIC_XMODEM, baudrate=9600) as b:
+        b.far.press_recv()
+        transfer = b.control.send_program(program_of(3000))
+        await until(lambda: transfer.account.blocks > 2)
+        transfer.cancel()
+        await asyncio.sleep(2)
+        b.far.press_recv()
+        assert (await b.control.send_program(PROGRAM)).warnings == ()
+
+
 # Wires ---------------------------------------------------------------------------------------------------------------
 
 

@@ -19,7 +19,7 @@ from .protocol import HaasProtocol
 from .protocol_events import Answered, HeldBack, NobodyAnswers, TransferOver, Unreadable
 from .settings import ControlSettings
 from .transfer import Kind
-from .transfers.account import LineAccount
+from .transfers.account import Ending, LineAccount
 from .transfers.choosing import drip_feed, receive_file, send_file
 from .transfers.strategy import Patience, Strategy
 
@@ -48,6 +48,8 @@ class ControlLine:
 
     Attributes:
         counted: What the port has counted during the last transfer; None: it does not count.
+        may_wait_for_rest: Whether a file was not sent to its end, so that the control takes what comes next for the
+            rest of it, unless RESET was pressed there. With XMODEM it is told.
     """
 
     def __init__(self, name: str, profile: Profile, settings: ControlSettings, **tells: Unpack[LineTells]) -> None:
@@ -55,6 +57,7 @@ class ControlLine:
         self.profile = profile
         self.settings = settings
         self.counted: LineErrors | None = None
+        self.may_wait_for_rest = False
         self._turn: Strategy | None = None
         """The transfer that is the turn of the line."""
         self.protocol = HaasProtocol(profile, settings)
@@ -148,10 +151,17 @@ class ControlLine:
             self._turn = None
             after = line_errors_of(port)
             self.counted = None if before is None or after is None else after.since(before)
+            self._note_rest(strategy)
         if isinstance(outcome, TransferOver):
             return outcome.account
         assert isinstance(outcome, HeldBack), outcome
         raise self.held_back(outcome)
+
+    def _note_rest(self, strategy: Strategy) -> None:
+        if strategy.ending is Ending.COMPLETE:
+            self.may_wait_for_rest = False
+        elif strategy.sends and not strategy.takes_all and strategy.account().written_bytes:
+            self.may_wait_for_rest = True
 
     def _take_turn(self, strategy: Strategy) -> None:
         self._turn = strategy

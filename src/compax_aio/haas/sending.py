@@ -20,6 +20,11 @@ from .verifying import Verified, only_on_screen, verified_sent
 
 __all__ = ["Sending"]
 
+_RESET_FIRST: Final = "; press RESET first: the file before was not sent to its end, and it may wait for the rest"
+_REST: Final = (
+    "the file before was not sent to its end: unless RESET was pressed at the control since, it has taken this one for "
+    "the rest of that one; look at what it has stored"
+)
 _BACK: Final = ", which sends back what was stored, to be compared"
 
 
@@ -59,7 +64,8 @@ class Sending(Transferring[Sent]):
             raise self._reports.unreadable(error, self.account()) from error
         self._total_bytes = len(prepared.data)
         strategy = self._line.sender(f"send {self.kind}", prepared.data, self._patience, kind=self.kind)
-        answer = self._ask_operator(sends=True)
+        may_be_rest = self._line.may_wait_for_rest
+        answer = self._ask_operator(sends=True, why=_RESET_FIRST if may_be_rest else "")
         if answer is not None and not self._line.profile.says_when_ready:
             await self._until_done_there(answer)
         on_line = await self._transfer(strategy)
@@ -80,11 +86,11 @@ class Sending(Transferring[Sent]):
             held_s=held_s,
             verified=verified,
             duration_s=self._loop.time() - self._began_at,
-            warnings=(*prepared.warnings, *self._warnings(on_line, proof)),
+            warnings=(*prepared.warnings, *self._warnings(on_line, proof, may_be_rest=may_be_rest and not verified)),
         )
 
-    def _warnings(self, on_line: LineAccount, proof: str) -> tuple[str, ...]:
-        warnings = []
+    def _warnings(self, on_line: LineAccount, proof: str, *, may_be_rest: bool) -> tuple[str, ...]:
+        warnings = [_REST] if may_be_rest else []
         if self._line.profile.synchronization == "dc codes" and proof != "reader off seen":
             warnings.append("the control has not said that it has read the last % (DC3): look at its screen")
         if on_line.detail:
