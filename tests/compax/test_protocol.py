@@ -738,7 +738,9 @@ PIECES_OF_ANSWERS: Final = [
 @settings(max_examples=400, deadline=None)
 @given(
     asked=st.sampled_from(["S1", "S 1", "S01", "P1", "N5", "SD50"]),
-    answer=st.lists(st.sampled_from([*PIECES_OF_ANSWERS, "\r", "\n", "END", "\xb2"]), max_size=7).map("".join),
+    answer=st.lists(
+        st.sampled_from([*PIECES_OF_ANSWERS, "\r", "\n", "\0", "\x11", "END", "\xb2", 300 * "5"]), max_size=7
+    ).map("".join),
 )
 @example(asked="S1", answer="S001: 5")
 @example(asked="S1", answer="S001: 5 ")

@@ -13,10 +13,10 @@ __all__ = ["ANSWER", "COMPARATOR", "COMPARATOR_BEFORE", "LINE_ENDS", "NOT_TEXT",
 ANSWER: Final = re.compile(r"([SPVN])0*(\d{1,3})(?!\d)\s*[:=]?\s*(.*)", re.DOTALL)
 """Letter, number and value of an answer to a query (UG p. 209)."""
 
-PLAIN_ANSWER: Final = re.compile(r"([SPVN])0*([0-9]{1,3})[ \t]*[:=][^\r\n]*(?<![ \t>])")
+PLAIN_ANSWER: Final = re.compile(r"([SPVN])0*([0-9]{1,3})[ \t]*[:=][^\r\n\0\x11\x13]*(?<![ \t>])\r\n>")
 """
-An answer that is one line, ends with no blank, and is no echo of its query with an answer behind it: by its sign, which
-no query has.
+An answer with its prompt that is one line of nothing but text, ends with no blank, and is no echo of its query with an
+answer behind it: by its sign, which no query has.
 """
 
 LINE_ENDS: Final = re.compile(r"[\r\n]+")

@@ -196,24 +196,8 @@ class CompaxProtocol:
 
     def receive(self, data: bytes) -> None:
         """Read *data*, a piece of any size; see :meth:`events`."""
-        # Flow control comes anywhere, in the middle of a prompt too.
-        text = data.translate(None, NOT_TEXT)
-        if self._recognition is not None and self._recognition.received(text) and self.state in BUSY & DOUBTFUL:
-            self._notice(MarkerSpent())
-        received, begin = self._received + text, 0
-        while True:
-            if self._number_may_follow and len(received) > begin:
-                begin += self._read_number_after_prompt(received[begin : begin + 1])
-            end = received.find(PROMPT, begin)
-            if end < 0:
-                break
-            self._recognition = None
-            self._read_token(received[begin:end])
-            begin = end + len(PROMPT)
-        self._received = received[begin:]
-        if len(self._received) > _MAX_TOKEN + len(PROMPT) - 1:
-            self._begin_flood(self._received)
-            self._received = self._received[1 - len(PROMPT) :]
+        if not self._read_plain_answer(self._received + data):
+            self._read(data.translate(None, NOT_TEXT))
 
     def events(self) -> list[Event]:
         """Take what has been noticed since the last call, in order."""
@@ -260,6 +244,41 @@ class CompaxProtocol:
 
     # Reading --------------------------------------------------------------------------------------------------------
 
+    def _read_plain_answer(self, received: bytes) -> bool:
+        """
+        Read *received*, all that has come since the last prompt, if it is the answer as it nearly always is.
+
+        Returns:
+            False if it is not: then it is for :meth:`_read`, which would have made the same of it.
+        """
+        if self.state is not State.AWAITING_ANSWER or self._flood or not received.endswith(PROMPT):
+            return False
+        text, asked = as_text(received), self._ledger.last
+        plain = PLAIN_ANSWER.fullmatch(text) if len(text) <= _MAX_TOKEN else None
+        if plain is None or asked is None or plain.groups() != asked.key:
+            return False
+        self._received, self._number_may_follow = b"", False
+        self._end_turn(Answered(text[: -len(PROMPT)]))
+        return True
+
+    def _read(self, text: bytes) -> None:
+        if self._recognition is not None and self._recognition.received(text) and self.state in BUSY & DOUBTFUL:
+            self._notice(MarkerSpent())
+        received, begin = self._received + text, 0
+        while True:
+            if self._number_may_follow and len(received) > begin:
+                begin += self._read_number_after_prompt(received[begin : begin + 1])
+            end = received.find(PROMPT, begin)
+            if end < 0:
+                break
+            self._recognition = None
+            self._read_token(received[begin:end])
+            begin = end + len(PROMPT)
+        self._received = received[begin:]
+        if len(self._received) > _MAX_TOKEN + len(PROMPT) - 1:
+            self._begin_flood(self._received)
+            self._received = self._received[1 - len(PROMPT) :]
+
     def _read_number_after_prompt(self, sign: bytes) -> int:
         """
         Read the comparator number that may follow a prompt nobody waited for (the running text of UG p. 162).
@@ -293,10 +312,7 @@ class CompaxProtocol:
         if self._flood:
             self._end_flood()
             return
-        asked, text = self._outstanding, as_text(raw)
-        if asked is not None and (plain := PLAIN_ANSWER.fullmatch(text)) and plain.groups() == asked.key:
-            self._end_turn(Answered(text))  # so it is nearly always; all that follows would make the same of it
-        elif raw:
+        if raw:
             self._read_lines(as_text(self._without_frame(raw)))
         else:
             self._read_prompt()
