@@ -124,7 +124,8 @@ class DriveLine:
 
     async def position(self, lane: Lane = Lane.READ) -> float:
         """Read S1, the actual position (UG p. 104), and remember it."""
-        self.last_position = await self.read("S1", decode_number, lane)
+        # Not through :meth:`read`: of all that is asked, this is asked most, and each coroutine costs.
+        self.last_position = self._decoded(decode_number, self._answer("S1", await self._ask("S1", lane)))
         return self.last_position
 
     async def status(self, lane: Lane = Lane.READ) -> DriveStatus:
