@@ -55,7 +55,7 @@ class ReplyTrouble:
     """
 
     def __init__(self, knobs: ReplyKnobs, chance: Chance, note: Callable[[str], None], reply: str = "reply") -> None:
-        self._reply_knobs = knobs
+        self._knobs = knobs
         self._chance = chance
         self._note = note
         self._reply = reply
@@ -68,7 +68,7 @@ class ReplyTrouble:
 
     def _loses_reply(self, text: str) -> bool:
         """Whether this one does not come."""
-        if self.replies_to_lose <= 0 and not self._chance.happens(self._reply_knobs.lose_reply):
+        if self.replies_to_lose <= 0 and not self._chance.happens(self._knobs.lose_reply):
             return False
         self.replies_to_lose = max(0, self.replies_to_lose - 1)
         self._note(f"{self._reply} {text} lost")
@@ -76,7 +76,7 @@ class ReplyTrouble:
 
     def _garbled_reply(self, text: str) -> str:
         """Return what becomes of it."""
-        if not text or (self.replies_to_garble <= 0 and not self._chance.happens(self._reply_knobs.garble_reply)):
+        if not text or (self.replies_to_garble <= 0 and not self._chance.happens(self._knobs.garble_reply)):
             return text
         self.replies_to_garble = max(0, self.replies_to_garble - 1)
         at = self._chance.randrange(len(text))
@@ -89,8 +89,8 @@ class ReplyTrouble:
         late_s = 0.0
         if self.replies_to_delay_s:
             late_s = self.replies_to_delay_s.popleft()
-        elif self._chance.happens(self._reply_knobs.late_reply):
-            late_s = self._reply_knobs.late_s
+        elif self._chance.happens(self._knobs.late_reply):
+            late_s = self._knobs.late_s
         if late_s:
             self._note(f"{self._reply} {text} {late_s:g} s late")
         return late_s

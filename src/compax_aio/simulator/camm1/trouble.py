@@ -23,8 +23,9 @@ class Trouble(ReplyTrouble):
         bytes_to_spoil: So many bytes of the host arrive as others.
     """
 
+    _knobs: Knobs
+
     def __init__(self, knobs: Knobs, note: Callable[[str], None]) -> None:
-        self._knobs = knobs
         super().__init__(knobs, Chance(knobs.seed), note)
 
     def end(self) -> None:

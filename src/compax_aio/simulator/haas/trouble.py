@@ -61,8 +61,9 @@ class Trouble(ReplyTrouble):
         acks_to_lose: So many ACK and NAK of the control are not sent.
     """
 
+    _knobs: Knobs
+
     def __init__(self, knobs: Knobs, note: Callable[[str], None]) -> None:
-        self._knobs = knobs
         self._parity = _Distance(knobs.parity_fault, Random(f"{knobs.seed} parity"))
         self._framing = _Distance(knobs.framing_fault, Random(f"{knobs.seed} framing"))
         self._spoilt = _Distance(knobs.spoil_sent, Random(f"{knobs.seed} spoilt"))
