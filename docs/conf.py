@@ -12,7 +12,14 @@ project = "compax_aio"
 author = "the compax_aio authors"
 project_copyright = author
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "state_diagrams", "tables_of_the_code"]
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "builtin_types",
+    "state_diagrams",
+    "tables_of_the_code",
+]
 exclude_patterns = ["_build", "_ext"]
 html_theme = "furo"
 html_title = "compax_aio"
