@@ -472,9 +472,9 @@ def port_of(tap: Tap) -> Port:
 async def test_much_at_once_is_read_in_order_and_in_pieces_while_nothing_more_is_taken(flood: SimpleNamespace) -> None:
     port = port_of(flood.tap)
     begun_at = now()
-    port.in_pieces(flood.data, lambda piece: flood.read.append((piece, now() - begun_at)))
+    port.received(flood.data, lambda piece, at: flood.read.append((piece, at - begun_at)))
     assert flood.tap.calls == ["pause"]
-    port.in_pieces(b"more", lambda piece: flood.read.append((piece, now() - begun_at)))
+    port.received(b"more", lambda piece, at: flood.read.append((piece, at - begun_at)))
     assert len(flood.read) == 1
     await asyncio.sleep(1)
     assert b"".join(piece for piece, _ in flood.read) == flood.data + b"more"
@@ -485,19 +485,19 @@ async def test_much_at_once_is_read_in_order_and_in_pieces_while_nothing_more_is
 
 async def test_little_is_read_at_once_without_a_pause(flood: SimpleNamespace) -> None:
     port = port_of(flood.tap)
-    port.in_pieces(flood.data[:64], flood.read.append)
+    port.received(flood.data[:64], lambda piece, _: flood.read.append(piece))
     assert flood.read == [flood.data[:64]]
     assert flood.tap.calls == []
 
 
 async def test_what_is_not_read_yet_is_not_read_on_the_next_line(flood: SimpleNamespace) -> None:
     port = port_of(flood.tap)
-    port.in_pieces(flood.data, flood.read.append)
+    port.received(flood.data, lambda piece, _: flood.read.append(piece))
     port.ended()
     await asyncio.sleep(0.0005)
     other = Tap()
     port.opened(cast("asyncio.Transport", other))
-    port.in_pieces(b"new", flood.read.append)
+    port.received(b"new", lambda piece, _: flood.read.append(piece))
     await asyncio.sleep(1)
     assert flood.read == [flood.data[:64], b"new"]
     assert flood.tap.calls == ["pause"]
@@ -508,12 +508,12 @@ async def test_what_is_not_read_yet_is_not_read_on_the_next_line(flood: SimpleNa
 async def test_a_line_that_is_lost_by_what_is_read_is_not_read_on(pieces: int, flood: SimpleNamespace) -> None:
     port = port_of(flood.tap)
 
-    def read(piece: bytes) -> None:
+    def read(piece: bytes, _: float) -> None:
         flood.read.append(piece)
         if len(flood.read) == pieces:
             port.ended()
 
-    port.in_pieces(flood.data[:128], read)
+    port.received(flood.data[:128], read)
     await asyncio.sleep(1)
     assert flood.read == [flood.data[:64], flood.data[64:128]][:pieces]
     assert flood.tap.calls == ["pause"]

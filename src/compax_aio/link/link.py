@@ -340,8 +340,7 @@ class Link(asyncio.Protocol):
         """Pass bytes in, events out."""
         if self._port.transport is None:  # any more
             return
-        self._port.received(data)
-        self._port.in_pieces(data, self._turns.receive)
+        self._port.received(data, self._turns.receive)
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Fail what tells something: nobody can say any more what becomes of it. What asks may wait for the line."""

@@ -99,12 +99,11 @@ class Port:
         if self._end is not None and not self._end.done():
             self._end.set_result(None)
 
-    def write(self, data: bytes, *, goes_on: bool = False) -> None:
+    def write(self, data: bytes, now: float, *, goes_on: bool = False) -> None:
         """Hand *data* to the transport, if there is one; *goes_on* with what was written before, or begin a line."""
         if self.transport is None:
             return
         self._stats.bytes_sent += len(data)
-        now = self._loop.time()
         self._history.sent(now, data, goes_on=goes_on)
         if _wire_log.isEnabledFor(logging.DEBUG):
             _wire_log.debug("%s → %s", self._name, readable(data))
@@ -112,28 +111,32 @@ class Port:
             self._sent_at = max(self._sent_at, now) + len(data) / self.bytes_per_s
         self.transport.write(data)
 
-    def received(self, data: bytes) -> None:
-        """Take note of bytes that have come."""
+    def received(self, data: bytes, read: Callable[[bytes, float], None]) -> None:
+        """
+        Take note of bytes that have come, and hand them to *read*, with the time.
+
+        The first piece is read at once, each other a while later, before more is taken.
+        """
         self._stats.bytes_received += len(data)
-        self.heard_at = self._loop.time()
-        self._history.received(self.heard_at, data)
+        self.heard_at = now = self._loop.time()
+        self._history.received(now, data)
         if _wire_log.isEnabledFor(logging.DEBUG):
             _wire_log.debug("%s ← %s", self._name, readable(data))
-
-    def in_pieces(self, data: bytes, read: Callable[[bytes], None]) -> None:
-        """Hand *data* to *read*: the first piece at once, each other a while later, before more is taken."""
-        if len(data) <= _PIECE_BYTES and not self._unread:
-            if self._telling.is_heard:
-                self._telling.tell(Received(data))
-            read(data)
+        if len(data) > _PIECE_BYTES or self._unread:
+            self._read_in_pieces(data, read)
             return
+        if self._telling.is_heard:
+            self._telling.tell(Received(data))
+        read(data, now)
+
+    def _read_in_pieces(self, data: bytes, read: Callable[[bytes, float], None]) -> None:
         is_at_it = bool(self._unread)
         self._unread += data
         if not is_at_it and self.transport is not None:
             self.transport.pause_reading()
             self._read_piece(self.transport, read)
 
-    def _read_piece(self, transport: asyncio.Transport, read: Callable[[bytes], None]) -> None:
+    def _read_piece(self, transport: asyncio.Transport, read: Callable[[bytes, float], None]) -> None:
         if transport is not self.transport:  # the line was lost meanwhile
             return
         piece = bytes(self._unread[:_PIECE_BYTES])
@@ -142,7 +145,7 @@ class Port:
             self._loop.call_later(_BETWEEN_PIECES_S, self._read_piece, transport, read)
         if self._telling.is_heard:
             self._telling.tell(Received(piece))
-        read(piece)
+        read(piece, self._loop.time())
         if not self._unread and transport is self.transport:
             transport.resume_reading()
 

@@ -119,7 +119,7 @@ class Turns:
     def put(self, exchange: Exchange) -> None:
         """Queue *exchange*, and write it if the line is free; what need not wait is not queued at all."""
         if self.is_free and self.queue.lets_pass and self._port.transport is not None and not self._is_ended:
-            self._begin(exchange)
+            self._begin(exchange, exchange.queued_at)
             if self._protocol.is_busy:
                 return
         else:
@@ -135,7 +135,7 @@ class Turns:
             and not self._protocol.is_busy
             and not self._port.is_stuck
         ):
-            self._send_ahead(stop)
+            self._send_ahead(stop, self._loop.time())
 
     def until_in_step(self) -> asyncio.Future[None]:
         """Return a future that is done when the line is in step, or fails with all else that waits."""
@@ -148,11 +148,11 @@ class Turns:
         self._doubt.begin()
         self.pump()
 
-    def receive(self, data: bytes) -> None:
+    def receive(self, data: bytes, now: float) -> None:
         """Pass bytes in, events out."""
         self._protocol.receive(data)
-        self._flush(_GOES_ON)
-        self._take_events()
+        self._flush(_GOES_ON, now)
+        self._take_events(now)
         if self._doubt.is_pursued and self._protocol.stranger(time_is_over=False) is not None:
             self._give_up()
         self.pump()
@@ -161,7 +161,7 @@ class Turns:
         """Give up what is outstanding: nobody will answer it on this line."""
         self._deadline.cancel()
         self._protocol.line_lost()
-        self._take_events()
+        self._take_events(self._loop.time())
         self.release_reads()
 
     def admit(self) -> None:
@@ -174,11 +174,12 @@ class Turns:
 
     def preempt(self, text: str) -> asyncio.Future[None]:
         """Write *text*, which the device heeds at any time; done when the line is in step again, or nobody answers."""
+        now = self._loop.time()
         self._protocol.preempt(text)
-        self._flush(Way.PREEMPT)
-        self._take_events()
+        self._flush(Way.PREEMPT, now)
+        self._take_events(now)
         self._doubt.begin()
-        self._give_time()
+        self._give_time(now)
         if self._in_step is None or self._in_step.done():
             self._in_step = self.until_in_step()
             self._in_step.add_done_callback(lambda each: each.cancelled() or each.exception())  # if nobody asks
@@ -222,50 +223,50 @@ class Turns:
                         self._give_up()
                     return
             elif (exchange := self.queue.take_next()) is not None:
-                self._begin(exchange)
+                self._begin(exchange, self._loop.time())
             else:
                 return
 
-    def _begin(self, exchange: Exchange) -> None:
+    def _begin(self, exchange: Exchange, now: float) -> None:
         """Send *exchange* in its turn."""
         self._outstanding = exchange
         self._protocol.send(exchange.text)
         exchange.is_on_wire = True
-        self._flush(_TURN, exchange)
-        self._began_at = self._loop.time()
-        self._give_time(self._began_at)
+        self._flush(_TURN, now, exchange)
+        self._began_at = now
+        self._give_time(now)
         if exchange.on_sent is not None:
             exchange.on_sent()
 
-    def _flush(self, way: Way, exchange: Exchange | None = None) -> None:
+    def _flush(self, way: Way, now: float, exchange: Exchange | None = None) -> None:
         if data := self._protocol.bytes_to_send():
             goes_on = way is _GOES_ON
             self.lines_sent += not goes_on
             if self._telling.is_heard and self._port.transport is not None:
                 self._telling.tell(Sent(data, exchange.number if exchange is not None else None, way))
-            self._port.write(data, goes_on=goes_on)
+            self._port.write(data, now, goes_on=goes_on)
 
-    def _give_time(self, begin: float | None = None) -> None:
+    def _give_time(self, begin: float) -> None:
         patience_s = self._protocol.patience_s
         self._patience_s = self._answer_timeout_s if patience_s is None else patience_s
-        self._deadline.put_off_to((self._loop.time() if begin is None else begin) + self._patience_s)
+        self._deadline.put_off_to(begin + self._patience_s)
 
-    def _take_events(self) -> None:
+    def _take_events(self, now: float) -> None:
         # Nothing new is sent until every event is dealt with: a turn that began in between would get their answers.
         self._is_reading = True
         try:
             for event in self._protocol.events():
                 if self._telling.is_heard and not isinstance(event, GoesOn):
                     self._telling.tell(Noticed.of(event))
-                self._handle(event)
+                self._handle(event, now)
         finally:
             self._is_reading = False
 
-    def _handle(self, event: Event) -> None:
+    def _handle(self, event: Event, now: float) -> None:
         if isinstance(event, TurnOver):
-            self._turn_is_over(event)
+            self._turn_is_over(event, now)
         elif isinstance(event, GoesOn):
-            self._give_time()
+            self._give_time(now)
         elif isinstance(event, LateEnding):
             self._stats.late_answers += 1
             self._log.tell(logging.INFO, "the answer to %r came late", event.sent)
@@ -280,12 +281,12 @@ class Turns:
             self._ensure_doubt_is_pursued()
             self._on_event(event)
 
-    def _turn_is_over(self, outcome: TurnOver) -> None:
+    def _turn_is_over(self, outcome: TurnOver, now: float) -> None:
         exchange, self._outstanding = self._outstanding, None
         if isinstance(outcome, TurnLost):
             self._stats.lost_turns += 1
         else:
-            self._stats.answered(self._loop.time() - self._began_at)
+            self._stats.answered(now - self._began_at)
         if self._protocol.in_doubt:
             self._doubt.begin()
         if exchange is not None:
@@ -308,7 +309,7 @@ class Turns:
 
     def _pursue_doubt(self) -> bool:
         """Send the next thing that helps to get in step; False when there is nothing left to try."""
-        doubt, stop = self._doubt, self.queue.first_stop()
+        doubt, stop, now = self._doubt, self.queue.first_stop(), self._loop.time()
         if stop is not None and not stop.times_ahead:
             doubt.stop_waits()
         if not doubt.markers_left or self._port.is_stuck:
@@ -317,23 +318,23 @@ class Turns:
             if stop is None:
                 return False
             doubt.marker_goes()
-            self._send_ahead(stop)
+            self._send_ahead(stop, now)
         elif stop is not None and doubt.may_send_ahead:
             # In turn with the markers, for half a line in the device's buffer may spoil either; the exchange itself
             # follows when in step.
             doubt.stop_goes_ahead()
-            self._send_ahead(stop)
+            self._send_ahead(stop, now)
         else:
             doubt.marker_goes()
             self._protocol.send_marker()
-            self._flush(Way.MARKER)
-        self._give_time()
+            self._flush(Way.MARKER, now)
+        self._give_time(now)
         return True
 
-    def _send_ahead(self, stop: Exchange) -> None:
+    def _send_ahead(self, stop: Exchange, now: float) -> None:
         stop.times_ahead += 1
         self._protocol.send_ahead(stop.text)
-        self._flush(Way.AHEAD, stop)
+        self._flush(Way.AHEAD, now, stop)
 
     def _end_doubt(self) -> None:
         self._stats.resynchronisations += 1
@@ -389,11 +390,12 @@ class Turns:
         was_busy = self._protocol.is_busy
         if not was_busy:
             return
+        now = self._loop.time()
         self._protocol.time_ran_out()
-        self._flush(_GOES_ON)
-        self._take_events()
+        self._flush(_GOES_ON, now)
+        self._take_events(now)
         if self._protocol.is_busy:  # that was a pause, and it goes on
-            self._give_time()
+            self._give_time(now)
         elif self._outstanding is not None:
             self._give_outstanding_up(self._outstanding)
         self.pump()
