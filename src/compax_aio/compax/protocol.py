@@ -37,6 +37,7 @@ from .protocol_states import (
     BUSY,
     DOUBTFUL,
     HELD,
+    MEANINGS,
     TRANSITIONS,
     CommandSent,
     LineOpened,
@@ -84,6 +85,9 @@ class CompaxProtocol:
         error_pattern: Finds an error in an answer; its first group is the code.
     """
 
+    patience_s: float | None = None
+    """As long as any answer."""
+
     def __init__(
         self,
         message_form: MessageForm = MessageForm.UNKNOWN,
@@ -110,11 +114,6 @@ class CompaxProtocol:
         self._flood = ""
 
     # What the link asks ---------------------------------------------------------------------------------------------
-
-    @property
-    def patience_s(self) -> float | None:
-        """As long as any answer."""
-        return None
 
     @property
     def held(self) -> Hold | None:
@@ -219,7 +218,7 @@ class CompaxProtocol:
                 hint="wait for the turn to be over",
             ) from None
         # What the state means to the link, which asks it far more often than it changes.
-        self.is_busy, self.in_doubt = state in BUSY, state in DOUBTFUL
+        self.is_busy, self.in_doubt = MEANINGS[state]
 
     def _notice(self, event: Event) -> None:
         self._step(type(event))
@@ -261,7 +260,8 @@ class CompaxProtocol:
         if plain is None or asked is None or plain.groups() != asked.key:
             return False
         self._received, self._number_may_follow = b"", False
-        self._end_turn(Answered(text[: -len(PROMPT)]))
+        self._ledger.settle()
+        self._notice(Answered(text[: -len(PROMPT)]))
         return True
 
     def _read(self, text: bytes) -> None:

@@ -24,6 +24,7 @@ __all__ = [
     "BUSY",
     "DOUBTFUL",
     "HELD",
+    "MEANINGS",
     "TRANSITIONS",
     "CommandSent",
     "LineOpened",
@@ -92,6 +93,9 @@ AWAITING: Final = frozenset({State.AWAITING_ANSWER, State.AWAITING_FRAME})
 AHEAD: Final = frozenset({State.AWAITING_AHEAD, State.AWAITING_STOP})
 BUSY: Final = AWAITING | AHEAD | {State.AWAITING_MARKER}
 DOUBTFUL: Final = HELD | AHEAD | {State.IN_DOUBT, State.AWAITING_MARKER}
+
+MEANINGS: Final[Mapping[State, tuple[bool, bool]]] = {state: (state in BUSY, state in DOUBTFUL) for state in State}
+"""What each state means to the link: whether a line is outstanding, and whether the line is in doubt."""
 
 TRANSITIONS: Final[Mapping[tuple[State, type[Event]], State]] = {
     (State.READY, CommandSent): State.AWAITING_ANSWER,

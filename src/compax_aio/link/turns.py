@@ -258,14 +258,15 @@ class Turns:
             for event in self._protocol.events():
                 if self._telling.is_heard and not isinstance(event, GoesOn):
                     self._telling.tell(Noticed.of(event))
-                self._handle(event, now)
+                if isinstance(event, TurnOver):
+                    self._turn_is_over(event, now)
+                else:
+                    self._handle(event, now)
         finally:
             self._is_reading = False
 
     def _handle(self, event: Event, now: float) -> None:
-        if isinstance(event, TurnOver):
-            self._turn_is_over(event, now)
-        elif isinstance(event, GoesOn):
+        if isinstance(event, GoesOn):
             self._give_time(now)
         elif isinstance(event, LateEnding):
             self._stats.late_answers += 1
