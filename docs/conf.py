@@ -18,6 +18,7 @@ extensions = [
     "sphinx.ext.napoleon",
     "builtin_types",
     "state_diagrams",
+    "tables_of_states",
     "tables_of_the_code",
 ]
 exclude_patterns = ["_build", "_ext"]

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import ast
 import dataclasses
 import inspect
 import re
 import textwrap
 import typing
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any
 
 from docutils import nodes
-from docutils.parsers.rst import Directive
 from sphinx.application import Sphinx
+from table_making import Cell, Table, add_tables, code, field_docstrings, plain
 
 from compax_aio import errors
 from compax_aio.cli.exit_codes import EXIT_CODES
@@ -26,7 +25,6 @@ from compax_aio.compax.facts.quantities import QUANTITIES
 from compax_aio.compax.facts.serial_interface import INTERFACE_BITS
 from compax_aio.compax.facts.settings import DIALECT_FACTS, SETTING_FACTS
 from compax_aio.compax.facts.status import S16_BITS, S17_BITS, STATUS_VALUES
-from compax_aio.compax.protocol import TRANSITIONS, State
 from compax_aio.compax.settings import Dialect, DriveSettings
 from compax_aio.haas.facts.alarms import ALARMS as CONTROL_ALARMS
 from compax_aio.haas.facts.queries import QUERIES
@@ -36,54 +34,16 @@ from compax_aio.simulator.haas import Knobs as ControlKnobs
 from compax_aio.simulator.smc import Knobs as SmcKnobs
 from compax_aio.smc.facts import COMMANDS, Reply
 from compax_aio.smc.profile import PROFILES, Profile
-from compax_aio.smc.protocol_states import TRANSITIONS as SMC_TRANSITIONS
-from compax_aio.smc.protocol_states import State as SmcState
 from compax_aio.smc.settings import SmcSettings
 
 __all__ = ["setup"]
-
-Cell = str | nodes.Node
-Table = tuple[Sequence[Cell], Sequence[Sequence[Cell]]]
-
-_WIDEST = 50
-_ROW = re.compile(r"Rows? [\d, and]+[:.] ?")
-
-
-def _code(text: str) -> nodes.Node:
-    return nodes.literal(text, text)
-
-
-def _table(head: Sequence[Cell], rows: Sequence[Sequence[Cell]]) -> nodes.table:
-    columns = zip(head, *rows, strict=True)
-    group = nodes.tgroup(cols=len(head))
-    group += [nodes.colspec(colwidth=min(_WIDEST, max(map(_length, column)))) for column in columns]
-    group += nodes.thead("", _row(head))
-    group += nodes.tbody("", *map(_row, rows))
-    return nodes.table("", group, classes=["colwidths-auto"])
-
-
-def _plain(text: str) -> str:
-    return " ".join(text.replace("``", "").split())
-
-
-def _length(cell: Cell) -> int:
-    return len(cell if isinstance(cell, str) else cell.astext())
-
-
-def _row(cells: Sequence[Cell]) -> nodes.row:
-    row = nodes.row()
-    for cell in cells:
-        content = nodes.Text(cell) if isinstance(cell, str) else cell
-        row += nodes.entry("", nodes.paragraph("", "", content))
-    return row
-
 
 # Errors
 
 
 def _error_rows(kind: type[BaseException], depth: int = 0) -> Iterator[tuple[Cell, Cell, Cell]]:
     """List *kind* and what is derived from it; a class with two parents stands under its first."""
-    first_line = _plain((kind.__doc__ or "").strip().splitlines()[0])
+    first_line = plain((kind.__doc__ or "").strip().splitlines()[0])
     others = [parent.__name__ for parent in kind.__bases__[1:]]
     yield _indented(kind.__name__, depth), first_line, ", ".join(others)
     for child in kind.__subclasses__():
@@ -93,7 +53,7 @@ def _error_rows(kind: type[BaseException], depth: int = 0) -> Iterator[tuple[Cel
 
 def _indented(name: str, depth: int) -> nodes.Node:
     text = "\N{NO-BREAK SPACE}" * 4 * depth
-    return nodes.inline("", "", nodes.Text(text), _code(name))
+    return nodes.inline("", "", nodes.Text(text), code(name))
 
 
 def _errors() -> Table:
@@ -149,7 +109,7 @@ def _status_values() -> Table:
 
 def _status_bits() -> Table:
     rows = [
-        (f"{status} bit {row.bit}", _code(row.name), row.meaning_when_set, _founded(row.certainty), row.source)
+        (f"{status} bit {row.bit}", code(row.name), row.meaning_when_set, _founded(row.certainty), row.source)
         for status, bits in (("S16", S16_BITS), ("S17", S17_BITS))
         for row in bits
     ]
@@ -165,7 +125,7 @@ def _interface_bits() -> Table:
     rows = [
         (
             str(row.weight),
-            _code(row.name) if row.name else "",
+            code(row.name) if row.name else "",
             row.meaning_when_set,
             _founded(row.certainty),
             row.source,
@@ -185,30 +145,14 @@ def _control_functions() -> Table:
         (
             str(row.number),
             row.meaning,
-            _code(row.word) if row.word else "",
+            code(row.word) if row.word else "",
             _founded(row.certainty),
             row.source,
-            _code(row.member) if row.member else "",
+            code(row.member) if row.member else "",
         )
         for row in CONTROL_FUNCTIONS
     ]
     return ("no.", "function", "word on RS-232", "word founded", "source", "sent by"), rows
-
-
-# States
-
-
-def _states() -> Table:
-    return ("state", "meaning"), [(_code(state.name), state.value) for state in State]
-
-
-def _transitions() -> Table:
-    events = dict.fromkeys(event for _, event in TRANSITIONS)
-    rows: list[Sequence[Cell]] = []
-    for event in events:
-        after = [TRANSITIONS.get((state, event)) for state in State]
-        rows.append((event.__name__.lstrip("_"), *("" if state is None else _code(state.name) for state in after)))
-    return ("event \\ in state", *(_code(state.name) for state in State)), rows
 
 
 # SMC
@@ -221,7 +165,7 @@ def _smc_commands() -> Table:
 
     rows = [
         (
-            _code(row.letter),
+            code(row.letter),
             row.meaning,
             "" if row.reply is Reply.NOTHING else row.reply.value,
             flags(row),
@@ -235,7 +179,7 @@ def _smc_commands() -> Table:
 
 def _profiles() -> Table:
     rows = [
-        (_code(field.name), *(_fact(getattr(profile, field.name)) for profile in PROFILES.values()))
+        (code(field.name), *(_fact(getattr(profile, field.name)) for profile in PROFILES.values()))
         for field in dataclasses.fields(Profile)
     ]
     return ("", *PROFILES), rows
@@ -252,25 +196,9 @@ def _fact(value: object) -> str:
     return "blank" if value == " " else f"{value:,.10g}" if isinstance(value, float) else str(value)
 
 
-def _smc_states() -> Table:
-    meanings = dict(_field_docstrings(SmcState))
-    return ("state", "meaning"), [(_code(state.name), meanings[state.name]) for state in SmcState]
-
-
-def _smc_transitions() -> Table:
-    rows: list[Sequence[Cell]] = []
-    for step in dict.fromkeys(step for _, step in SMC_TRANSITIONS):
-        after = {state: SMC_TRANSITIONS[state, step] for state in SmcState if (state, step) in SMC_TRANSITIONS}
-        if len(after) == len(SmcState):
-            rows.append((step.value, "any", _code(after[SmcState.READY].name)))
-        else:
-            rows += [(step.value, _code(state.name), _code(then.name)) for state, then in after.items()]
-    return ("event", "in state", "leads to"), rows
-
-
 def _smc_settings() -> Table:
-    meanings = dict(_field_docstrings(SmcSettings))
-    rows = [(_code(name), _smc_shown(default), meanings[name]) for name, default in _defaults(SmcSettings)]
+    meanings = dict(field_docstrings(SmcSettings))
+    rows = [(code(name), _smc_shown(default), meanings[name]) for name, default in _defaults(SmcSettings)]
     return ("setting", "default", "meaning"), rows
 
 
@@ -286,7 +214,7 @@ def _settings() -> Table:
     meanings = dict(_attributes(told))
     facts = {row.name: row for row in SETTING_FACTS}
     rows = [
-        (_code(name), _shown(default), _founded(facts[name].certainty), facts[name].source, meanings[name])
+        (code(name), _shown(default), _founded(facts[name].certainty), facts[name].source, meanings[name])
         for name, default in _defaults(DriveSettings)
     ]
     return ("setting", "default", "founded", "source", "meaning"), rows
@@ -296,8 +224,8 @@ def _dialect() -> Table:
     facts = {row.name: row for row in DIALECT_FACTS}
     rows = [
         (
-            _code(name),
-            "not set" if default is None else _code(default),
+            code(name),
+            "not set" if default is None else code(default),
             _founded(facts[name].certainty),
             facts[name].source,
             facts[name].meaning,
@@ -312,32 +240,16 @@ def _attributes(docstring: str) -> Iterator[tuple[str, str]]:
     section = textwrap.dedent(docstring.partition("Attributes:\n")[2])
     for entry in re.split(r"\n(?=\S)", section.rstrip()):
         name, _, meaning = entry.partition(": ")
-        yield name, _plain(meaning.replace("…", ""))
+        yield name, plain(meaning.replace("…", ""))
 
 
 def _knobs(kind: type) -> Table:
-    meanings = dict(_field_docstrings(kind))
+    meanings = dict(field_docstrings(kind))
     kinds = typing.get_type_hints(kind, include_extras=True)
     rows = [
-        (_code(name), _values(kinds[name]), _shown(default), meanings.get(name, ""))
-        for name, default in _defaults(kind)
+        (code(name), _values(kinds[name]), _shown(default), meanings.get(name, "")) for name, default in _defaults(kind)
     ]
     return ("knob", "values", "default", "meaning"), rows
-
-
-def _field_docstrings(kind: type) -> Iterator[tuple[str, str]]:
-    """Read the string that stands under each field of a dataclass, or member of an enumeration."""
-    (definition,) = ast.parse(textwrap.dedent(inspect.getsource(kind))).body
-    assert isinstance(definition, ast.ClassDef)
-    name = ""
-    for statement in definition.body:
-        if isinstance(statement, ast.AnnAssign | ast.Assign):
-            (target,) = statement.targets if isinstance(statement, ast.Assign) else (statement.target,)
-            name = target.id if isinstance(target, ast.Name) else ""
-        elif name and isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant):
-            meaning = _ROW.sub("", _plain(str(statement.value.value)))
-            yield name, meaning[:1].upper() + meaning[1:] if re.match("a |[a-z]{2}", meaning) else meaning
-            name = ""
 
 
 def _values(kind: Any) -> str:
@@ -373,7 +285,7 @@ def _control_alarms() -> Table:
     for each in CONTROL_ALARMS.values():
         heard = "" if each.heard_as is None else f" (often told as {each.heard_as})"
         number = f"not known{heard}" if each.number is None else str(each.number)
-        rows.append((number, _code(each.text), each.meaning, each.remedy, each.certainty.value))
+        rows.append((number, code(each.text), each.meaning, each.remedy, each.certainty.value))
     return head, rows
 
 
@@ -381,10 +293,10 @@ def _questions() -> Table:
     head = ("question", "meaning", "classic answer", "answer over Ethernet")
     return head, [
         (
-            _code(f"{each.command} n" if each.takes_variable else each.command),
+            code(f"{each.command} n" if each.takes_variable else each.command),
             each.meaning,
-            _code(each.classic_example),
-            _code(each.ethernet_example),
+            code(each.classic_example),
+            code(each.ethernet_example),
         )
         for each in QUERIES.values()
     ]
@@ -393,47 +305,30 @@ def _questions() -> Table:
 # Sphinx
 
 
-def _directive(make: Callable[[], Table]) -> type[Directive]:
-    class TableDirective(Directive):
-        """Puts one table in place."""
-
-        option_spec: ClassVar[Any] = {}
-
-        def run(self) -> list[nodes.Node]:
-            return [_table(*make())]
-
-    return TableDirective
-
-
 def setup(app: Sphinx) -> dict[str, bool]:
     """Add a directive for each table."""
-    tables: Iterable[tuple[str, Callable[[], Table]]] = (
-        ("table-of-errors", _errors),
-        ("table-of-exit-codes", _exit_codes),
-        ("table-of-device-errors", _device_errors),
-        ("table-of-error-ranges", _error_ranges),
-        ("table-of-status-values", _status_values),
-        ("table-of-status-bits", _status_bits),
-        ("table-of-quantities", _quantities),
-        ("table-of-interface-bits", _interface_bits),
-        ("table-of-parameters", _parameters),
-        ("table-of-control-functions", _control_functions),
-        ("table-of-dialect", _dialect),
-        ("table-of-states", _states),
-        ("table-of-transitions", _transitions),
-        ("table-of-settings", _settings),
-        ("table-of-knobs", partial(_knobs, Knobs)),
-        ("table-of-smc-commands", _smc_commands),
-        ("table-of-smc-states", _smc_states),
-        ("table-of-smc-transitions", _smc_transitions),
-        ("table-of-smc-settings", _smc_settings),
-        ("table-of-smc-knobs", partial(_knobs, SmcKnobs)),
-        ("table-of-camm1-knobs", partial(_knobs, CutterKnobs)),
-        ("table-of-haas-knobs", partial(_knobs, ControlKnobs)),
-        ("table-of-haas-alarms", _control_alarms),
-        ("table-of-haas-questions", _questions),
-        ("table-of-profiles", _profiles),
-    )
-    for name, make in tables:
-        app.add_directive(name, _directive(make))
+    tables: dict[str, Callable[[], Table]] = {
+        "table-of-errors": _errors,
+        "table-of-exit-codes": _exit_codes,
+        "table-of-device-errors": _device_errors,
+        "table-of-error-ranges": _error_ranges,
+        "table-of-status-values": _status_values,
+        "table-of-status-bits": _status_bits,
+        "table-of-quantities": _quantities,
+        "table-of-interface-bits": _interface_bits,
+        "table-of-parameters": _parameters,
+        "table-of-control-functions": _control_functions,
+        "table-of-dialect": _dialect,
+        "table-of-settings": _settings,
+        "table-of-knobs": partial(_knobs, Knobs),
+        "table-of-smc-commands": _smc_commands,
+        "table-of-smc-settings": _smc_settings,
+        "table-of-smc-knobs": partial(_knobs, SmcKnobs),
+        "table-of-camm1-knobs": partial(_knobs, CutterKnobs),
+        "table-of-haas-knobs": partial(_knobs, ControlKnobs),
+        "table-of-haas-alarms": _control_alarms,
+        "table-of-haas-questions": _questions,
+        "table-of-profiles": _profiles,
+    }
+    add_tables(app, tables)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
