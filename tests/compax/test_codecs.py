@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import fields
 from typing import Any
+from unittest.mock import patch
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from compax_aio.compax.codecs import (
@@ -71,6 +73,30 @@ def test_an_answer_without_a_number_is_no_number(answer: str) -> None:
 def test_every_number_is_read_as_it_was_sent(number: Any, separator: str, plus: bool, unit: str) -> None:
     sign = "+" if plus and number >= 0 else ""
     assert decode_number(f"S001{separator}{sign}{number}{unit}") == float(number)
+
+
+def number_or_none(answer: str) -> float | None:
+    try:
+        return decode_number(answer)
+    except UnexpectedAnswerError:
+        return None
+
+
+@settings(max_examples=400, deadline=None)
+@given(
+    st.lists(
+        st.sampled_from(["S001", "S", "1", "23", ":", "=", " ", "\t", "+", "-", ".", ",", "e5", "mm", "_", "\xb2"])
+    )
+)
+@example(["S001", ":", " ", "-", "1", ".", "23"])
+@example(["S001", ":", " ", "1", "."])
+@example(["S001", ":", " ", "-", ".", "23"])
+@example(["S001", ":", " ", "1", "e5"])
+def test_a_number_as_it_nearly_always_is_is_read_as_any_other(pieces: list[str]) -> None:
+    answer = "".join(pieces)
+    at_once = number_or_none(answer)
+    with patch("compax_aio.compax.codecs._PLAIN_NUMBER", re.compile(r"(?!)")):
+        assert number_or_none(answer) == at_once
 
 
 @pytest.mark.parametrize(

@@ -45,6 +45,8 @@ _NUMBER_ANSWER: Final = re.compile(
     rf"[ \t]*+(?:{_HEAD.pattern})?+[ \t:=]*+([-+]?+)[ \t]*+([0-9]++(?:\.[0-9]*+)?+|\.[0-9]++)"
     r"(?![eE][-+]?\d)(?:[^\d\s.,'+-][^\d\s.,'+/]*(?:/[^\d\s.,'+]*\d?)?)?(?:\s+[^\d\s.,'+-]\S*)*\s*"
 )
+_PLAIN_NUMBER: Final = re.compile(r"[SPVN][0-9]++:[ \t]*+([-+]?+[0-9]++\.?+[0-9]*+)")
+"""What nearly all answers are, and :data:`_NUMBER_ANSWER` reads in more steps."""
 _BLANKS: Final = " \t"
 _ACTIVE_BIT: Final = next(bit.bit for bit in S17_BITS if bit.name == "command_active")
 _BITS: Final = re.compile(r"[01]{8}")
@@ -212,6 +214,8 @@ def decode_number(answer: str) -> float:
     Raises:
         UnexpectedAnswerError: There is none.
     """
+    if plain := _PLAIN_NUMBER.fullmatch(answer):
+        return float(plain[1])
     found = _NUMBER_ANSWER.fullmatch(answer)
     if found is None:
         raise UnexpectedAnswerError("the answer holds no number that is understood", received=answer)
