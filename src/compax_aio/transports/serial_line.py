@@ -128,19 +128,19 @@ class SerialLine(serial_asyncio.SerialTransport):  # type: ignore[misc]  # it ha
         """Send *data* now as far as the port takes it, and the rest as soon as it does."""
         if self._closing or not data:
             return
-        rest = memoryview(data)
+        taken = 0
         if not self._write_buffer:
             try:
-                rest = rest[os.write(self._fd, rest) :]
+                taken = os.write(self._fd, data)
             except (BlockingIOError, InterruptedError):
                 pass
             except OSError as exc:
                 self._went_away(exc)
                 return
-            if not rest:
+            if taken == len(data):
                 return
             self._ensure_writer()
-        self._write_buffer += rest
+        self._write_buffer += memoryview(data)[taken:]
         self._maybe_pause_protocol()
 
     def writelines(self, list_of_data: Iterable[bytes | bytearray | memoryview]) -> None:
