@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import os
+import sys
 from collections.abc import AsyncIterator
 from dataclasses import replace
 from pathlib import Path
@@ -410,6 +412,15 @@ async def test_a_file_that_is_not_there_is_told(tmp_path: Path) -> None:
     async with bench() as on:
         with pytest.raises(FileNotFoundError):
             await on.cutter.cut(tmp_path / "none.hpgl")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such files")
+async def test_nobody_waits_for_the_other_end_of_a_pipe(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    async with bench() as on:
+        with pytest.raises(OSError, match="no plain file"):
+            await on.cutter.cut(tmp_path / "pipe")
+        await on.cutter.cut(SQUARE)
 
 
 async def test_a_second_job_is_refused_while_one_is_under_way() -> None:

@@ -11,6 +11,7 @@ from typing import BinaryIO, Final
 
 from ..errors import InvalidCommandError
 from ..escaping import shown
+from ..text_file import open_file
 from .facts.line import DC1, DC3, ENQ
 from .facts.mnemonics import Shape, mnemonic_of
 from .language.instruction import Instruction, Language
@@ -77,7 +78,7 @@ class _File(Source):
             yield data
 
     def _open(self) -> BinaryIO:
-        file = self._path.open("rb")
+        file = open_file(self._path)  # a pipe cannot be read twice, and may never begin
         self.total_bytes = os.fstat(file.fileno()).st_size
         return file
 
