@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from contextlib import AsyncExitStack, ExitStack, suppress
-from typing import Annotated, Final
+from typing import Annotated
 
 from cyclopts import App, Parameter
 from rich.console import Group, RenderableType
@@ -14,18 +14,14 @@ from rich.table import Table
 from rich.text import Text
 
 from compax_aio.errors import InvalidCommandError
-from compax_aio.simulator.camm1 import Knobs as CutterKnobs
-from compax_aio.simulator.compax import Knobs
 from compax_aio.simulator.far_end import FarEnd
-from compax_aio.simulator.haas import Knobs as ControlKnobs
 from compax_aio.simulator.knob_descriptions import describe_knobs
 from compax_aio.simulator.planned_faults import ANY_CODE, FAULT_KINDS
-from compax_aio.simulator.smc import Knobs as LineKnobs
 
 from .exit_codes import OK
 from .interruption import moves_nothing
 from .printing import Printing
-from .simulating.devices import Device, Faults, Place, controls, cutters, drives, lines
+from .simulating.devices import KINDS, Device, Faults, Place, made
 from .simulating.hands import Hands
 from .simulating.prompt import listen, pasted_above_prompt
 from .simulating.view import SimView
@@ -46,18 +42,27 @@ standard input, and read `--json`.
 KnobWords = Annotated[str, Parameter(help="KNOB=VALUE …; `compax sim knobs` lists them.")]
 Quiet = Annotated[bool, Parameter(negative=(), help="Do not show what the far end sees.")]
 
-_KINDS: Final[Mapping[str, type]] = {"compax": Knobs, "smc": LineKnobs, "camm1": CutterKnobs, "haas": ControlKnobs}
+
+def _serving(kind: str, what: str) -> Callable[..., Awaitable[int]]:
+    """Return the command that serves devices of that kind; *what* is its help."""
+
+    async def serve(
+        *knobs: KnobWords,
+        quiet: Quiet = False,
+        place: Place = Place(),  # noqa: B008 - it is frozen
+        faults: Faults = Faults(),  # noqa: B008 - it is frozen
+        printing: Printing = Printing(),  # noqa: B008 - it is frozen
+    ) -> int:
+        devices = made(KINDS[kind], knobs, place, faults.seed)
+        return await _serve(devices, place, faults, printing, is_quiet=quiet, look=KINDS[kind].look)
+
+    serve.__doc__ = what
+    app.command(moves_nothing(serve), name=kind)
+    return serve
 
 
-@app.command(name="compax")
-@moves_nothing
-async def serve_compax(
-    *knobs: KnobWords,
-    quiet: Quiet = False,
-    place: Place = Place(),  # noqa: B008 - it is frozen
-    faults: Faults = Faults(),  # noqa: B008 - it is frozen
-    printing: Printing = Printing(),  # noqa: B008 - it is frozen
-) -> int:
+serve_compax = _serving(
+    "compax",
     """
     Serve one COMPAX drive, or several.
 
@@ -68,19 +73,10 @@ async def serve_compax(
     compax sim compax --fault garbled=0.01 --fault late=0.05:300ms
     compax sim compax --fault unplug@30s+5s --fault E55@60s
     ```
-    """
-    return await _serve(drives(knobs, place), place, faults, printing, is_quiet=quiet, look="status")
-
-
-@app.command(name="smc")
-@moves_nothing
-async def serve_smc(
-    *knobs: KnobWords,
-    quiet: Quiet = False,
-    place: Place = Place(),  # noqa: B008 - it is frozen
-    faults: Faults = Faults(),  # noqa: B008 - it is frozen
-    printing: Printing = Printing(),  # noqa: B008 - it is frozen
-) -> int:
+    """,
+)
+serve_smc = _serving(
+    "smc",
     """
     Serve a line of SMC stepper axes, or several lines.
 
@@ -88,19 +84,10 @@ async def serve_smc(
     compax sim smc axes=XYZ baudrate=9600
     compax sim smc mode=single --tcp 4001
     ```
-    """
-    return await _serve(lines(knobs, place, faults.seed), place, faults, printing, is_quiet=quiet, look="smc scan")
-
-
-@app.command(name="camm1")
-@moves_nothing
-async def serve_camm1(
-    *knobs: KnobWords,
-    quiet: Quiet = False,
-    place: Place = Place(),  # noqa: B008 - it is frozen
-    faults: Faults = Faults(),  # noqa: B008 - it is frozen
-    printing: Printing = Printing(),  # noqa: B008 - it is frozen
-) -> int:
+    """,
+)
+serve_camm1 = _serving(
+    "camm1",
     """
     Serve a CAMM-1 cutter, or several.
 
@@ -110,19 +97,10 @@ async def serve_camm1(
     compax sim camm1 baudrate=9600
     compax sim camm1 model=PNC-900 physical_size=256 --link /tmp/cutter
     ```
-    """
-    return await _serve(cutters(knobs, place, faults.seed), place, faults, printing, is_quiet=quiet, look="camm1 info")
-
-
-@app.command(name="haas")
-@moves_nothing
-async def serve_haas(
-    *knobs: KnobWords,
-    quiet: Quiet = False,
-    place: Place = Place(),  # noqa: B008 - it is frozen
-    faults: Faults = Faults(),  # noqa: B008 - it is frozen
-    printing: Printing = Printing(),  # noqa: B008 - it is frozen
-) -> int:
+    """,
+)
+serve_haas = _serving(
+    "haas",
     """
     Serve a Haas CNC control, or several.
 
@@ -134,9 +112,8 @@ async def serve_haas(
     compax sim haas profile=dc_codes baudrate=9600 --link /tmp/mill
     compax sim haas press=send:O00010,recv press_again=1 --tcp 4001
     ```
-    """
-    served = controls(knobs, place, faults.seed)
-    return await _serve(served, place, faults, printing, is_quiet=quiet, look="haas query")
+    """,
+)
 
 
 async def _serve(
@@ -202,9 +179,9 @@ def knobs(
     compax sim knobs haas
     ```
     """
-    if kind not in _KINDS:
-        raise InvalidCommandError(f"there is no simulated {kind!r}", hint=f"there are {', '.join(_KINDS)}")
-    described = describe_knobs(_KINDS[kind])
+    if kind not in KINDS:
+        raise InvalidCommandError(f"there is no simulated {kind!r}", hint=f"there are {', '.join(KINDS)}")
+    described = describe_knobs(KINDS[kind].knobs)
     rows: list[RenderableType] = []
     for each in described:
         rows.append(Text.assemble((f"{each.name}={each.default}", "bold"), (f"   {each.values}", "dim")))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, NamedTuple
 
 from cyclopts import Parameter
 
@@ -30,7 +30,7 @@ from compax_aio.simulator.smc.log import LogEntry as LineLogEntry
 
 from ..number_words import WHOLE
 
-__all__ = ["Device", "Entry", "Faults", "Place", "controls", "cutters", "drives", "lines", "query_of"]
+__all__ = ["KINDS", "Device", "Entry", "Faults", "Kind", "Place", "made", "query_of"]
 
 Device = SimulatedDrive | SimulatedPartyLine | SimulatedCutter | SimulatedControl
 Entry = LogEntry | LineLogEntry | CutterLogEntry | ControlLogEntry
@@ -125,28 +125,36 @@ class Faults:
         return FarEnd(device, outlet, read_faults(self.fault), seed=self.seed, say=say)
 
 
-def drives(knobs: Sequence[str], place: Place) -> dict[str, Device]:
-    """Make COMPAX drives, by name; raises InvalidCommandError."""
-    query = query_of(knobs)
-    return {name: SimulatedDrive(_read(Knobs.from_query, query), name=name) for name in place.names("drive")}
+class Kind(NamedTuple):
+    """A kind of device that is served."""
+
+    device: Callable[..., Device]
+    knobs: type[Any]
+    usual_name: str
+    """Of one that was given none."""
+    look: str
+    """The command that looks at one."""
 
 
-def lines(knobs: Sequence[str], place: Place, seed: int) -> dict[str, Device]:
-    """Make lines of SMC axes, by name; *seed* is also theirs if no knob says another; raises InvalidCommandError."""
-    query = {"seed": str(seed), **query_of(knobs)}
-    return {name: SimulatedPartyLine(_read(LineKnobs.from_query, query), name=name) for name in place.names("line")}
+KINDS: Final[Mapping[str, Kind]] = {
+    "compax": Kind(SimulatedDrive, Knobs, "drive", "status"),
+    "smc": Kind(SimulatedPartyLine, LineKnobs, "line", "smc scan"),
+    "camm1": Kind(SimulatedCutter, CutterKnobs, "cutter", "camm1 info"),
+    "haas": Kind(SimulatedControl, ControlKnobs, "control", "haas query"),
+}
+"""By the word that names it."""
 
 
-def cutters(knobs: Sequence[str], place: Place, seed: int) -> dict[str, Device]:
-    """Make CAMM-1 cutters, by name; *seed* is also theirs if no knob says another; raises InvalidCommandError."""
-    query = {"seed": str(seed), **query_of(knobs)}
-    return {name: SimulatedCutter(_read(CutterKnobs.from_query, query), name=name) for name in place.names("cutter")}
+def made(kind: Kind, knobs: Sequence[str], place: Place, seed: int) -> dict[str, Device]:
+    """
+    Make devices, by name; *seed* is also theirs, if they have one and no knob says another.
 
-
-def controls(knobs: Sequence[str], place: Place, seed: int) -> dict[str, Device]:
-    """Make Haas controls, by name; *seed* is also theirs if no knob says another; raises InvalidCommandError."""
-    query = {"seed": str(seed), **query_of(knobs)}
-    return {name: SimulatedControl(_read(ControlKnobs.from_query, query), name=name) for name in place.names("control")}
+    Raises:
+        InvalidCommandError: A knob, a name or a number of devices cannot be.
+    """
+    own_seed = {"seed": str(seed)} if any(each.name == "seed" for each in fields(kind.knobs)) else {}
+    query = own_seed | query_of(knobs)
+    return {name: kind.device(_read(kind.knobs.from_query, query), name=name) for name in place.names(kind.usual_name)}
 
 
 def query_of(knobs: Sequence[str]) -> dict[str, str]:
