@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import json
 import re
 import signal
@@ -14,6 +15,7 @@ import pytest
 
 from compax_aio.cli import app
 from compax_aio.cli.exchanging import sending
+from compax_aio.haas.archive import Archive
 from compax_aio.simulator.clock import VirtualClockLoop
 from compax_aio.simulator.haas import Knobs, LogKind, SimulatedControl
 from compax_aio.simulator.server import control_named
@@ -158,6 +160,31 @@ def test_a_file_that_is_there_is_not_written_over(compax: Compax, on_stage: Plan
     assert "O00010" in Path("ten.nc").read_text()
 
 
+def test_a_file_that_came_there_meanwhile_is_left_as_it_is_and_told(compax: Compax, on_stage: Plan) -> None:
+    on_stage(1.0, lambda _: Path("ten.nc").write_text("somebody else's"))
+    on_stage(2.0, send("O00010"))
+    code, text = compax("receive", URL, "program", "--out", "ten.nc")
+    assert code == 0
+    assert "ten 2.nc: program," in text
+    assert "was left as it is" in text
+    assert Path("ten.nc").read_text() == "somebody else's"
+
+
+def test_of_a_full_disk_nothing_is_said_that_only_programs_can_do(
+    compax: Compax, on_stage: Plan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def no_room(self: Archive, data: bytes) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Archive, "_append", no_room)
+    on_stage(1.0, send("O00010"))
+    code, text = compax("receive", URL, "program", "--out", "ten.nc")
+    assert code == 2
+    assert "is the disk full? Receive it again when there is room" in text
+    assert "not all that came is in" in text
+    assert "error.data" not in text
+
+
 @pytest.mark.parametrize("out", ["backup/", "nowhere/ten.nc", ""])
 def test_a_folder_is_not_taken_for_a_file(compax: Compax, on_stage: Plan, out: str) -> None:
     code, text = compax("receive", URL, "program", "--out", out)
@@ -277,6 +304,16 @@ def test_where_the_control_does_not_say_that_it_is_ready_somebody_has_to(compax:
     assert code == 2
     assert "the control does not say when RECV is pressed, and nobody is at a terminal" in text
     assert "--ready" in text
+
+
+def test_a_control_that_holds_the_line_at_the_end_is_not_told_as_a_part_of_what_it_took(
+    compax: Compax, on_stage: Plan, mill: dict[str, Any]
+) -> None:
+    mill["synchronization"] = "dc codes"  # its DC3 behind the last % is Xoff to this profile
+    on_stage(0.0, recv())
+    code, text = compax("send", URL, "new.nc", "--ready")
+    assert code == 0
+    assert re.search(r"bytes in [0-9.]+ s; the control held the line for [0-9.]+ s proved", text)
 
 
 def test_somebody_may_have_pressed_recv_in_advance(compax: Compax, on_stage: Plan, mill: dict[str, Any]) -> None:

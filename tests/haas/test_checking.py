@@ -103,11 +103,11 @@ def test_programs_wrapped_one_by_one_have_too_many_percents() -> None:
     assert [each.line for each in check_program("%\nO1\n%\n%\nO2\n%\n")] == [3, 4]
 
 
-def test_what_stands_outside_is_not_sent_and_told() -> None:
+def test_what_stands_in_front_is_told_and_what_stands_behind_and_would_not_be_sent_is_an_error() -> None:
     problems = check_program("HELLO\n%\nO1\n%\nBYE\n")
     assert told(problems) == [
         (1, 1, "warning", "6 bytes in front of the first %"),
-        (5, 1, "warning", "4 bytes behind the last %"),
+        (5, 1, "error", "4 bytes behind the last %"),
     ]
 
 

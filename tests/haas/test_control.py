@@ -296,7 +296,7 @@ async def test_several_programs_go_in_one_pair_of_percent_signs(tmp_path: Path) 
 @pytest.mark.parametrize(
     ("program", "what"),
     [
-        ("M30", "without a name"),
+        ("M30", "without the name"),
         ("O8123\nM30", "protected"),
         ("O1234\nG0;X1\nM30", "semicolon"),
         ("O1234\nG0 x1\nM30", "small letter"),

@@ -2,8 +2,9 @@
 What comes from a control, kept in a file while it comes: as ``*.incomplete`` until it is whole, then under its name.
 
 Everything that touches the disk runs in a thread, one thing after the other, and is carried through although whoever
-waits for it is cancelled. A file that is there is replaced at the end, or left as it is; one that was left incomplete
-by an earlier transfer is never overwritten.
+waits for it is cancelled. A file that is there from the beginning is replaced at the end, or left as it is. One that
+has come there since, or was changed, is somebody else's: it is left as it is, and what came gets a name beside it. One
+that was left incomplete by an earlier transfer is never overwritten.
 """
 
 from __future__ import annotations
@@ -65,6 +66,10 @@ class Archive:
         self._written = 0
         self._working: asyncio.Future[Any] | None = None
         """What a thread is at, or was last."""
+        self._replaces: _Identity | None = None
+        """The file that was there from the beginning; None: there was none."""
+        self.avoided: Path | None = None
+        """Where it was to be, and is not, because somebody else's file has come there meanwhile."""
         self.place: Path | None = None
         """Where the file is now; None before it is opened."""
         self.failure: OSError | None = None
@@ -161,6 +166,7 @@ class Archive:
                 path = path / f"{self._kind} {self._when}"
             elif path.exists():
                 expect_file(path, path.stat())
+                self._replaces = _identity_of(path)
             self._path = path
         except ValueError:
             raise InvalidCommandError(f"{shown(str(self._path))} can be no name of a file") from None
@@ -205,13 +211,17 @@ class Archive:
         if size < self._written:
             self._file.truncate(size)
         self._close()
-        target = self._path
-        if self._folder is None:
-            with suppress(OSError):  # there is none, or it is another's
+        if self._folder is not None:
+            suffix = ".nc" if self._kind.startswith("program") else ".txt"
+            target = self._take_free_name(self._folder, f"{name or self._kind} {self._when}", suffix)
+        elif self._replaces is not None and _identity_of(self._path) == self._replaces:
+            target = self._path
+            with suppress(OSError):  # it is another's
                 self.place.chmod(target.stat().st_mode)
             self.place.replace(target)
         else:
-            target = self._place_in_folder(self._folder, name or self._kind)
+            target = self._take_free_name(self._path.parent, self._path.stem, self._path.suffix)
+            self.avoided = None if target == self._path else self._path
         self.place = target
         _sync_folder(target.parent)
         return target
@@ -223,12 +233,11 @@ class Archive:
         except OSError as error:
             self.failure = self.failure or error
 
-    def _place_in_folder(self, folder: Path, name: str) -> Path:
+    def _take_free_name(self, folder: Path, stem: str, suffix: str) -> Path:
         """Give the file a name that nothing in the folder has."""
         assert self.place is not None
-        suffix = ".nc" if self._kind.startswith("program") else ".txt"
         for count in range(1, _MOST_NAMES):
-            target = folder / f"{name} {self._when}{'' if count == 1 else f' {count}'}{suffix}"
+            target = folder / f"{stem}{'' if count == 1 else f' {count}'}{suffix}"
             try:
                 os.link(self.place, target)  # does not replace, as a renaming would
             except FileExistsError:
@@ -240,7 +249,7 @@ class Archive:
             else:
                 self.place.unlink()
             return target
-        raise FileExistsError(f"there are {_MOST_NAMES - 1} files of that name in {folder}")
+        raise FileExistsError(errno.EEXIST, f"There are {_MOST_NAMES - 1} files of that name", str(folder / stem))
 
     def _discard(self) -> None:
         self._close()
@@ -248,6 +257,18 @@ class Archive:
             with suppress(OSError):
                 self.place.unlink()
             self.place = None
+
+
+_Identity = tuple[int, int, int, int]
+
+
+def _identity_of(path: Path) -> _Identity | None:
+    """Return what tells a file from any other, and from itself when it was changed; None: none is there."""
+    try:
+        status = path.stat()
+    except FileNotFoundError:
+        return None
+    return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
 
 
 def _sync_folder(folder: Path) -> None:

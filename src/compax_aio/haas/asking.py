@@ -20,7 +20,8 @@ class Asking:
     Data collection of a control (Setting 143), for :class:`Control`.
 
     Any number of callers may ask at once: questions go one after the other, with a pause between them, ever more
-    rarely while the control is silent, and not while a transfer is under way or a program prints.
+    rarely while the control is silent, and not while a transfer is under way or a program prints; nor, until
+    :meth:`Control.reset_was_pressed`, behind a file that was not sent to its end.
 
     All of these raise InvalidCommandError if the profile says that the control collects no data; AnswerTimeoutError if
     it does not answer, or cannot be asked now; CommandRejectedError if it does not know the question, or is busy and

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from typing import Final, TypeVar
 
 from ..errors import InvalidCommandError
@@ -19,7 +20,7 @@ from .language.program_file import Program, ProgramFile, parse_program_file
 from .problems import Finding, Kind, Problem, raise_for_errors, some, told
 from .profiles import CLASSIC, Profile
 
-__all__ = ["Problem", "check_data_file", "check_program", "raise_for_errors"]
+__all__ = ["Problem", "check_bare_program", "check_data_file", "check_program", "has_text_behind", "raise_for_errors"]
 
 _T = TypeVar("_T")
 
@@ -59,25 +60,56 @@ def check_program(
     if not isinstance(file, ProgramFile):
         file = parse_program_file(file, eob=profile.eob)
     lines = Lines(file.data, file.eob)
+    findings = [
+        *_about_frame(lines),
+        *_about_programs(file, lines, profile, for_dnc=for_dnc, protected=protected, semicolons=semicolons),
+    ]
+    return told(findings, lines)
+
+
+def check_bare_program(
+    source: ProgramFile | Program, profile: Profile, *, for_dnc: bool, protected: bool, semicolons: bool
+) -> tuple[Problem, ...]:
+    """
+    Say what is wrong with programs that the ``%`` lines are still to be put around.
+
+    Args:
+        source: Without ``%`` lines; or a program of a file: places are those in that file.
+        profile: The control.
+        for_dnc: See :func:`check_program`.
+        protected: The same.
+        semicolons: The same.
+    """
+    file = source if isinstance(source, ProgramFile) else parse_program_file(bytes(source), eob=profile.eob)
+    lines = Lines(file.data, file.eob)
+    findings = _about_programs(file, lines, profile, for_dnc=for_dnc, protected=protected, semicolons=semicolons)
+    problems = told(list(findings), lines)
+    if isinstance(source, ProgramFile):
+        return problems
+    return tuple(
+        replace(each, line=each.line + source.line - 1, offset=each.offset + source.offset) for each in problems
+    )
+
+
+def _about_programs(
+    file: ProgramFile, lines: Lines, profile: Profile, *, for_dnc: bool, protected: bool, semicolons: bool
+) -> Iterator[Finding]:
+    """Look at all that stands between the ``%`` lines."""
     begin, end = lines.offsets[lines.first], lines.offsets[lines.behind]
     body = file.data[begin:end]
     masked = _without_comments(body)
-    findings = [
-        *_about_frame(lines),
-        *_about_signs(body, begin),
-        *_about_semicolons(body, begin, Severity.NOTE if semicolons else Severity.ERROR),
-        *_about_percents(body, masked, begin),
-        *_about_words(masked, body, begin),
-        *_about_bad_names(file.programs, profile),
-    ]
+    yield from _about_signs(body, begin)
+    yield from _about_semicolons(body, begin, Severity.NOTE if semicolons else Severity.ERROR)
+    yield from _about_percents(body, masked, begin)
+    yield from _about_words(masked, body, begin)
+    yield from _about_bad_names(file.programs, profile)
     if for_dnc:
-        findings += _about_line_numbers(masked, begin)
+        yield from _about_line_numbers(masked, begin)
     else:  # what is fed is not stored, whatever its name
-        findings += _about_names(file.programs, profile, protected=protected)
+        yield from _about_names(file.programs, profile, protected=protected)
     if not file.programs:
         what, hint = "there is no program", "put one between the % lines"
-        findings.append(Finding(Kind.PARTS, begin, Severity.ERROR, what, hint, ALARMS["empty-program"]))
-    return told(findings, lines)
+        yield Finding(Kind.PARTS, begin, Severity.ERROR, what, hint, ALARMS["empty-program"])
 
 
 _COMMENT: Final = re.compile(rb"\([^)\r\n]*\)?")
@@ -107,13 +139,19 @@ def _about_frame(lines: Lines) -> Iterator[Finding]:
         hint = "put % alone in the last line; if it was there once, the file has been cut short"
         yield Finding(Kind.PARTS, size, Severity.ERROR, "it does not end with %", hint, ALARMS["unexpected-end"])
     yield from some((at for at in lines.percents if at not in (lines.start, lines.end)), _percent_line_of(lines))
-    for where, offset, outside in (
-        ("in front of the first %", 0, lines.lead_in),
-        ("behind the last %", size - len(lines.tail), lines.tail),
-    ):
-        if outside.strip(SKIPPED + LINE_ENDS):
-            what, hint = f"{len(outside)} bytes {where}", "the control takes what stands between the % lines alone"
-            yield Finding(Kind.OUTSIDE, offset, Severity.WARNING, what, hint)
+    if lines.lead_in.strip(SKIPPED + LINE_ENDS):
+        what = f"{len(lines.lead_in)} bytes in front of the first %"
+        hint = "they are not sent: a control takes what stands between the % lines alone"
+        yield Finding(Kind.OUTSIDE, 0, Severity.WARNING, what, hint)
+    if has_text_behind(lines.tail):
+        what = f"{len(lines.tail)} bytes behind the last %"
+        hint = "they would not be sent: put them in front of it, or take them out"
+        yield Finding(Kind.OUTSIDE, size - len(lines.tail), Severity.ERROR, what, hint)
+
+
+def has_text_behind(tail: bytes) -> bool:
+    """Whether there is more behind the last ``%`` than ends of blocks, fill, leader and punch codes."""
+    return bool(tail.strip(SKIPPED + LINE_ENDS))
 
 
 def _percent_line_of(lines: Lines) -> Callable[[int], Finding]:

@@ -42,7 +42,7 @@ class Collecting:
 
     def __init__(self, line: ControlLine, transfer: Callable[[], asyncio.Future[Any] | None]) -> None:
         self.line = line
-        self.pacing = Pacing(line.name, line.settings, transfer)
+        self.pacing = Pacing(line.name, line.settings, transfer, lambda: line.may_wait_for_rest)
         self._loop = asyncio.get_running_loop()
         self._under_way: set[asyncio.Task[str]] = set()
         self._overheard = 0

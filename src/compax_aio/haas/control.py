@@ -255,6 +255,16 @@ class Control(Asking, OpenDevice[ControlLine]):
         """The transfer under way, or the last one; None: there was none."""
         return None if self._transferring is None else self._transferring.transfer
 
+    def reset_was_pressed(self) -> None:
+        """
+        Say that RESET was pressed at the control, so that it does not wait for the rest of a file any more.
+
+        When a file was not sent to its end, over a line that has no sign for that, the control may still read it, and
+        would take a question for a part of the program. So nothing is asked until this is said, or until a file that
+        comes, or goes, to its end has shown it. With XMODEM the control is told, and nobody has to say it.
+        """
+        self._line.may_wait_for_rest = False
+
     # How transfers are made -----------------------------------------------------------------------------------------
 
     def _receive(self, kind: Kind, how: HowToReceive) -> Transfer[Received]:

@@ -45,14 +45,20 @@ class Pacing:
         name: Of the control.
         settings: How long things take.
         transfer: Says which transfer there is, under way or over.
+        may_wait_for_rest: Says whether the control may take what comes next for the rest of a file.
     """
 
     def __init__(
-        self, name: str, settings: ControlSettings, transfer: Callable[[], asyncio.Future[Any] | None]
+        self,
+        name: str,
+        settings: ControlSettings,
+        transfer: Callable[[], asyncio.Future[Any] | None],
+        may_wait_for_rest: Callable[[], bool],
     ) -> None:
         self._name = name
         self._settings = settings
         self._transfer = transfer
+        self._may_wait_for_rest = may_wait_for_rest
         self._loop = asyncio.get_running_loop()
         self._waiting: OrderedDict[asyncio.Future[None], None] = OrderedDict()
         """First come, first served; each is done when it is the first one."""
@@ -101,8 +107,8 @@ class Pacing:
         self._wake()
 
     async def until_free(self) -> None:
-        """Wait until something may be asked, however long that takes."""
-        while (block := self._block()) is not None:
+        """Wait until something may be asked, however long that takes; what only somebody can end is not waited for."""
+        while (block := self._pause()) is not None:
             await self._change(block.until, block)
 
     @property
@@ -136,6 +142,17 @@ class Pacing:
     # Waiting --------------------------------------------------------------------------------------------------------
 
     def _block(self) -> _Block | None:
+        return self._pause() or self._rest()
+
+    def _rest(self) -> _Block | None:
+        """Return what keeps questions out of a program that the control may still read."""
+        if not self._may_wait_for_rest():
+            return None
+        why = "the file before was not sent to its end, and the control may take a question for the rest of it"
+        hint = "press RESET at the control, then say so: reset_was_pressed()"
+        return _Block(why, hint, self._loop.time(), 0.0)
+
+    def _pause(self) -> _Block | None:
         now, settings = self._loop.time(), self._settings
         transfer = self._transfer()
         if transfer is not None and not transfer.done():

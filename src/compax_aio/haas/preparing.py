@@ -6,13 +6,13 @@ import os
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final
+from typing import Final, TypedDict
 
 from ..errors import InvalidCommandError
 from ..escaping import shown
 from ..severity import Severity
 from ..text_file import name_of, open_file
-from .checking import check_data_file, check_program
+from .checking import check_bare_program, check_data_file, check_program
 from .facts.characters import NEVER_IN_A_FILE
 from .facts.data_files import DataKind
 from .language.building import build_program_file
@@ -48,6 +48,12 @@ class Prepared:
     warnings: tuple[str, ...] = field(default=())
 
 
+class _Meant(TypedDict):
+    for_dnc: bool
+    protected: bool
+    semicolons: bool
+
+
 def prepare_programs(
     sources: Iterable[ProgramSource],
     kind: Kind,
@@ -66,19 +72,19 @@ def prepare_programs(
     """
     for_dnc = kind == "drip feed"
     problems: list[Problem] = []
-    programs: list[ProgramFile] = []
+    programs: list[ProgramFile | Program] = []
     for source in sources:
         given = _program_of(source, profile, max_bytes)
+        meant: _Meant = {"for_dnc": for_dnc, "protected": protected, "semicolons": semicolons}
         if isinstance(given, ProgramFile) and (given.has_start or given.has_end):
-            each = given
-        else:  # a bare text, or one program of a file: it is looked at with its % lines
-            each = build_program_file(given, eob=profile.eob, o_digits=profile.o_digits, for_dnc=for_dnc)
-        problems += check_program(each, profile, for_dnc=for_dnc, protected=protected, semicolons=semicolons)
-        programs.append(each)
+            problems += check_program(given, profile, **meant)
+        else:  # what it lacks is put around it here
+            problems += check_bare_program(given, profile, **meant)
+        programs.append(given)
     raise_for_errors(problems)
-    if len(programs) > 1:
-        _refuse_doubles(programs)
     built = build_program_file(programs, eob=profile.eob, o_digits=profile.o_digits, for_dnc=for_dnc)
+    if len(programs) > 1:
+        _refuse_doubles(built.programs)
     if kind == "program" and len(built.programs) > 1:
         raise InvalidCommandError(f"there are {len(built.programs)} programs in it", hint="use send_programs()")
     _refuse_signs(built.data)
@@ -170,9 +176,9 @@ def _refuse_large(size: int, max_bytes: int) -> None:
         )
 
 
-def _refuse_doubles(programs: list[ProgramFile]) -> None:
+def _refuse_doubles(programs: Iterable[Program]) -> None:
     seen: set[int] = set()
-    for number in (number for each in programs for number in each.numbers):
+    for number in (each.number for each in programs if each.number is not None):
         if number in seen:
             raise InvalidCommandError(
                 f"program {number} is given twice", hint="the control would keep one of them; say which"

@@ -9,8 +9,9 @@ from typing import Final
 from ..errors import InvalidCommandError
 from ..motion.events import DriveEvent
 from ..severity import Severity
+from ..text_file import name_of
 from .archive import Archive
-from .checking import check_data_file
+from .checking import check_data_file, has_text_behind
 from .facts.characters import TEXT
 from .facts.data_files import DataKind
 from .language.data_file import DataFile, parse_data_file
@@ -161,6 +162,11 @@ class Receiving(Transferring[Received]):
             )
         if self._line.profile.synchronization == "dc codes" and not on_line.has_dc4:
             warnings.append("the control has not said that this was all (DC4): its end is known by silence behind a %")
+        if self._archive is not None and self._archive.avoided is not None:
+            warnings.append(
+                f"{name_of(self._archive.avoided)} has come, or was changed, meanwhile, and was left as it is: what "
+                f"was received is in {name_of(self._archive.place or self._archive.avoided)}"
+            )
         return tuple(warnings)
 
     def _proof_of(self, on_line: LineAccount) -> str:
@@ -182,11 +188,13 @@ def read_file(data: bytes, kind: Kind, profile: Profile) -> tuple[ProgramFile | 
     if kind in {"program", "programs"}:
         return _programs(data, kind, profile)
     file = parse_data_file(data, DataKind(kind), eob=profile.eob)
-    problems = check_data_file(file)
+    behind = _behind(file.tail)  # of what came it is a warning, of what is to be sent an error
+    whole = parse_data_file(file.lead_in + file.payload, file.kind, eob=profile.eob) if behind else file
+    problems = check_data_file(whole)
     for each in problems:
         if each.severity is Severity.ERROR:
             raise InvalidCommandError(each.what, hint=each.hint)
-    return file, tuple(str(each) for each in problems)
+    return file, (*(str(each) for each in problems), *behind)
 
 
 def _programs(data: bytes, kind: Kind, profile: Profile) -> tuple[ProgramFile, tuple[str, ...]]:
@@ -203,7 +211,14 @@ def _programs(data: bytes, kind: Kind, profile: Profile) -> tuple[ProgramFile, t
         )
     if len(file.percent_lines) > 2:  # one pair
         warnings.append("there are several pairs of % in it: to send it back, they must be one")
-    return file, tuple(warnings)
+    return file, (*warnings, *_behind(file.tail))
+
+
+def _behind(tail: bytes) -> tuple[str, ...]:
+    """Say that more came than what ends with ``%``."""
+    if not has_text_behind(tail):
+        return ()
+    return (f"{len(tail)} bytes came behind the last %, and are no part of it: to send it back, take them out",)
 
 
 def name_of_file(file: ProgramFile | DataFile) -> str | None:

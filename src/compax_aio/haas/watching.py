@@ -40,9 +40,9 @@ class Reading:
     at: float
     """The event loop's time, in seconds, when the cycle began."""
     values: Mapping[Quantity, Any]
-    """By question, or number of variable: a text, a number, a time, None for an empty variable, a ProgramStatus."""
+    """By question or number of variable. Each is a text, a number, a time, a ProgramStatus, or None if it is empty."""
     errors: Mapping[Quantity, CompaxError]
-    """The same: AnswerTimeoutError, CommandRejectedError or UnexpectedAnswerError."""
+    """By the same. Each is an AnswerTimeoutError, CommandRejectedError or UnexpectedAnswerError."""
 
     def __getitem__(self, quantity: Quantity) -> Any:
         """

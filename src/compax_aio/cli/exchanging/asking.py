@@ -31,7 +31,7 @@ _USUAL: Final = tuple(each for each, row in QUERIES.items() if not row.takes_var
 _WHY_SILENT: Final = (
     "is Setting 143 (MACHINE DATA COLLECT) on, and the control switched on? Compare Settings 11 (baud rate), 12 "
     "(parity), 13 (stop bits) and 37 (data bits) with --profile; some controls want a question mark: --profile "
-    "data-collection-115200"
+    "data-collection-115200. One that waits for the rest of a file takes questions for it: press RESET there"
 )
 
 

@@ -18,8 +18,13 @@ from .view import TransferView
 __all__ = ["Conductor"]
 
 _Result = TypeVar("_Result")
-_WORDS: Final = {"accept_damaged=True takes": "--accept-damaged takes", "with the profile": "with --profile"}
-"""What hints of the library are called here."""
+_WORDS: Final = {
+    "accept_damaged=True takes": "--accept-damaged takes",
+    "with the profile": "with --profile",
+    "the bytes are error.data; is the disk full?": "is the disk full? Receive it again when there is room",
+    ": error.data has it": "",
+}
+"""What hints and notes of the library are called here."""
 OnOperator = Callable[[str], Awaitable[None] | None]
 
 
@@ -99,13 +104,12 @@ def _what_now(account: TransferAccount) -> str:
 def _tell_people(error: CompaxError) -> None:
     """Say what to do at a terminal, in its words, and nothing twice: the account stands in most errors already."""
     if error.hint is not None:
-        for here, there in _WORDS.items():
-            error.hint = error.hint.replace(here, there)
+        error.hint = _in_words_of_here(error.hint)
     notes = getattr(error, "__notes__", [])
-    archive = getattr(getattr(error, "transfer", None), "archive", None)
-    notes[:] = [
-        each
-        for each in notes
-        if each.removeprefix("transfer: ") not in error.what
-        and (archive is not None or not each.startswith("what came is in"))
-    ]
+    notes[:] = [_in_words_of_here(each) for each in notes if each.removeprefix("transfer: ") not in error.what]
+
+
+def _in_words_of_here(text: str) -> str:
+    for theirs, ours in _WORDS.items():
+        text = text.replace(theirs, ours)
+    return text

@@ -119,7 +119,7 @@ def _tell_received(received: Received, out: Path, took_s: float, printing: Print
     told = {each.name: getattr(received, each.name) for each in fields(received) if each.name not in _LEFT_OUT}
     told["verified"] = None if received.verified is None else {"equal": received.verified.equal}
     assert received.archive is not None  # one was asked for
-    file = out / received.archive.name if out.is_dir() else out
+    file = _named_as_given(out, received.archive)
     lines = [
         f"{name_of(file)}: {received.kind}, {len(received.data):,} bytes in {written_time(took_s)}: "
         f"{_in_words(contents)}",
@@ -131,6 +131,13 @@ def _tell_received(received: Received, out: Path, took_s: float, printing: Print
     )
     for warning in received.warnings:
         printing.note(f"{received.kind}: {warning}")
+
+
+def _named_as_given(out: Path, archive: Path) -> Path:
+    """Name the file as the command did; elsewhere than it was to be, by its own name."""
+    if out.is_dir():
+        return out / archive.name
+    return out if archive == Path(os.path.realpath(out)) else archive
 
 
 def _contents_of(received: Received) -> Contents:

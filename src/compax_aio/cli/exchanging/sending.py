@@ -175,7 +175,7 @@ def _begin(
 def _tell_sent(title: str, sent: Sent, took_s: float, printing: Printing) -> None:
     verb = "sent and read back" if sent.verified is not None else "fed" if sent.kind == "drip feed" else "sent"
     blocks = f" in {sent.blocks:,} blocks" if sent.blocks else ""
-    held = f", of which the control held the line for {written_time(sent.held_s)}" if sent.held_s else ""
+    held = f"; the control held the line for {written_time(sent.held_s)}" if sent.held_s else ""
     proved = sent.proof if sent.verified is None else f"{sent.proof}: {sent.verified.proves}"
     printing.show(
         {"file": title, "sent": sent},
