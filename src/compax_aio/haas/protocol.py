@@ -21,18 +21,11 @@ from ..errors import InvalidCommandError, LinkProtocolError
 from ..link.contract import Event, GoesOn, Hold, InStep, MarkerSpent, Stranger
 from ..link.level import LineLevel
 from .facts.characters import ETB, PROMPT, STX
-from .frames import Broken, Echo, Frame, FrameSplitter, Line, Outside, Part, PrintReader
+from .frames import Broken, Frame, Outside, Part
 from .line_code import LineCode
+from .listening import Listener, Pause, on_the_wire_s
 from .profiles import Profile
-from .protocol_events import (
-    Answered,
-    CutShort,
-    HeldBack,
-    LeftOver,
-    Printed,
-    TransferOver,
-    Unreadable,
-)
+from .protocol_events import Answered, CutShort, HeldBack, TransferOver, Unreadable
 from .protocol_states import BUSY, DOUBTFUL, TRANSITIONS, State, Step
 from .questions import Questions
 from .settings import ControlSettings
@@ -42,12 +35,6 @@ from .transfers.strategy import Strategy
 
 __all__ = ["HaasProtocol"]
 
-_MOST_WHILE_QUIETING_BYTES: Final = 4096
-"""So much comes in four seconds at 9600 baud: whatever it is, it does not end soon."""
-_MOST_PUT_OFFS: Final = 256
-"""And so often such a pause begins anew."""
-_SILENT_CHARACTERS: Final = 16
-"""A pause is none in which not even so many could have come: a UART may hand over as many at once, and no sooner."""
 _ANSWER_BYTES: Final = 64
 """Answers have a dozen to fifty characters, and what was asked may come back in front of one."""
 
@@ -70,19 +57,15 @@ class HaasProtocol:
         self._profile = profile
         self._settings = settings
         self._code = LineCode(profile)
-        self._splitter = FrameSplitter(profile.data_collection or "rs-232")
-        self._prints = PrintReader()
+        self._listener = Listener(profile)
         self._questions = Questions()
         self._loaded: Strategy | None = None
         self._strategy: Strategy | None = None
         """Of the transfer that is the turn."""
         self._signs = FlowSigns(profile)
-        self._came_bytes = self._put_offs = 0
-        """In the pause, so far."""
+        self._pause = Pause()
         self._babbles = False
         """Whether something never stops coming."""
-        self._is_file_left = False
-        """Whether what comes is what is left of a file that is not wanted any more."""
         self._to_send: list[bytes] = []
         self._events: list[Event] = []
 
@@ -105,23 +88,18 @@ class HaasProtocol:
         if self.state is State.TRANSFERRING:
             return self._transfer.pause_s
         if self.state is State.QUIETING:
-            return self._silent_s(settings.quiet_s)
+            return self._pause.lasts_s(settings.quiet_s, self.level)
         if self.state is State.CALMING:
             return settings.silence_timeout_s if self._signs.is_held else self._calm_s
-        return settings.answer_timeout_s + self.level.leaves_s(self._unwritten_bytes) + self._takes_s(_ANSWER_BYTES)
+        takes_s = self.level.leaves_s(self._unwritten_bytes) + on_the_wire_s(_ANSWER_BYTES, self.level)
+        return settings.answer_timeout_s + takes_s
 
     @property
     def _calm_s(self) -> float:
         """How long the line is silent before something is sent."""
         is_file_in_doubt = self._strategy is not None and self._questions.owes
-        return self._silent_s(self._settings.quiet_s if is_file_in_doubt else self._settings.gap_s)
-
-    def _silent_s(self, at_least_s: float) -> float:
-        return max(at_least_s, self._takes_s(_SILENT_CHARACTERS))
-
-    def _takes_s(self, count: int) -> float:
-        """How long so many bytes are on the wire; 0 where nobody knows how fast it is."""
-        return count / self.level.bytes_per_s if self.level.bytes_per_s else 0.0
+        at_least_s = self._settings.quiet_s if is_file_in_doubt else self._settings.gap_s
+        return self._pause.lasts_s(at_least_s, self.level)
 
     @property
     def held(self) -> Hold | None:
@@ -155,10 +133,10 @@ class HaasProtocol:
     def _begin_anew(self) -> None:
         self._strategy = None
         self._questions.line_is_new()
-        self._splitter.give_up()
-        self._prints.give_up()
+        self._listener.forget_answer()
+        self._listener.forget_print()
         self._signs.forget()
-        self._babbles = self._is_file_left = False
+        self._babbles = False
         self._to_send.clear()
 
     def load(self, strategy: Strategy) -> None:
@@ -194,7 +172,7 @@ class HaasProtocol:
         """Give up what is outstanding, a transfer as its synchronisation has it, and wait until the line is quiet."""
         if self._strategy is not None:
             self._strategy.give_up()
-            self._is_file_left |= self.state is State.TRANSFERRING and not self._strategy.sends
+            self._listener.drops_file |= self.state is State.TRANSFERRING and not self._strategy.sends
             self._events.append(TransferOver(self._strategy.account()))
             self._strategy = None
         elif (asked := self._questions.asked) is not None:
@@ -254,9 +232,7 @@ class HaasProtocol:
     def _put_off_pause(self, came_bytes: int) -> None:
         if not came_bytes or self.state not in {State.QUIETING, State.CALMING}:
             return
-        self._came_bytes += came_bytes
-        self._put_offs += 1
-        if self._came_bytes <= _MOST_WHILE_QUIETING_BYTES and self._put_offs <= _MOST_PUT_OFFS:
+        if self._pause.put_off(came_bytes):
             if not (self.state is State.CALMING and self._signs.is_held):
                 self._events.append(GoesOn())
         elif self.state is State.QUIETING:
@@ -267,9 +243,7 @@ class HaasProtocol:
             self._hold_back(by_xoff=False)
 
     def _read_answers(self, data: bytes, is_damaged: bool) -> None:
-        if is_damaged:
-            self._splitter.note_damage()
-        for part in self._splitter.feed(data):
+        for part in self._listener.split(data, is_damaged=is_damaged):
             if isinstance(part, Frame):
                 self._read_frame(part.text)
             elif isinstance(part, Broken):
@@ -278,18 +252,10 @@ class HaasProtocol:
                 self._read_outside(part.data, part.is_damaged)
 
     def _read_outside(self, data: bytes, is_damaged: bool) -> None:
-        if self._is_file_left:
-            self._events.append(LeftOver(len(data)))
-        else:
-            self._print(self._prints.feed(data, is_damaged=is_damaged))
-
-    def _print(self, lines: list[Line | Echo]) -> None:
-        for line in lines:
-            if isinstance(line, Line) and line.text.strip():
-                self._events.append(Printed(line.text, line.is_damaged))
+        self._events += self._listener.outside(data, is_damaged=is_damaged)
 
     def _read_frame(self, text: str) -> None:
-        self._print(self._prints.answer_begins())
+        self._events += self._listener.answer_begins()
         if (event := self._questions.read(text)) is not None:
             self._note_answer(event)
         else:
@@ -307,20 +273,19 @@ class HaasProtocol:
 
     def _forget_begun(self) -> None:
         """Expect no more of an answer of which only the beginning has come."""
-        for part in self._splitter.give_up():
-            if isinstance(part, Broken):
-                self._note_answer(self._questions.read_broken(part.data.decode("latin-1")))
+        for begun in self._listener.forget_answer():
+            self._note_answer(self._questions.read_broken(begun))
 
     def _get_in_step(self) -> None:
         self._forget_begun()
-        self._print(self._prints.give_up())
-        self._babbles = self._is_file_left = False
+        self._events += self._listener.forget_print()
+        self._babbles = False
         self._step(Step.QUIET)
         self._events.append(InStep())
 
     def _begin_pause(self, step: Step) -> None:
         self._step(step)
-        self._came_bytes = self._put_offs = 0
+        self._pause.begin()
 
     def _end_calm(self) -> None:
         self._forget_begun()
@@ -334,7 +299,7 @@ class HaasProtocol:
     def _ask(self) -> None:
         text = self._profile.request_prefix + self._questions.next_text()
         self._step(Step.PROBE_SENT if self._questions.is_probing else Step.QUERY_SENT)
-        self._prints.expect_echo(text, earlier_may_come=self._questions.owes)
+        self._listener.expect_echo(text, earlier_may_come=self._questions.owes)
         self._write((text + self._profile.request_end).encode("ascii"))
 
     def _hold_back(self, *, by_xoff: bool) -> None:
@@ -367,9 +332,7 @@ class HaasProtocol:
             may_answer = self._may_answer(strategy)
             end = _behind_answer(data) if may_answer or strategy.phase is Phase.WAIT_START else len(data)
             if may_answer:
-                if is_damaged:
-                    self._splitter.note_damage()
-                for part in self._splitter.feed(data[:end]):
+                for part in self._listener.split(data[:end], is_damaged=is_damaged):
                     self._read_part_in_transfer(strategy, part)
             else:
                 self._give(strategy, data[:end], is_damaged, self._read_answers)
@@ -378,7 +341,7 @@ class HaasProtocol:
 
     def _may_answer(self, strategy: Strategy) -> bool:
         """Whether what comes next may belong to an answer, although a file is on its way."""
-        return not strategy.takes_all and (strategy.sends or self._questions.owes or self._splitter.awaits_prompt)
+        return not strategy.takes_all and (strategy.sends or self._questions.owes or self._listener.awaits_prompt)
 
     def _read_part_in_transfer(self, strategy: Strategy, part: Part) -> None:
         if isinstance(part, Frame):
@@ -405,8 +368,8 @@ class HaasProtocol:
             return
         is_whole = strategy.ending is Ending.COMPLETE
         self._strategy = None
-        self._splitter.give_up()
-        self._is_file_left = not (is_whole or strategy.sends)
+        self._listener.forget_answer()
+        self._listener.drops_file = not (is_whole or strategy.sends)
         self._events.append(TransferOver(strategy.account()))
         self._step(Step.TRANSFER_OVER if is_whole else Step.TRANSFER_BROKEN)
 

@@ -146,7 +146,8 @@ class TransferReports:
 
     def lost(self, account: TransferAccount, cause: CompaxError) -> ConnectionLostError:
         """Report a transfer whose line was lost, or closed."""
-        hint = f"a transfer is never resumed: begin anew when the line is back; {_SCREEN}"
+        reset = "press RESET at the control, which waits for the rest, and " if account.way == "send" else ""
+        hint = f"a transfer is never resumed: {reset}begin anew when the line is back; {_SCREEN}"
         error = self._of(ConnectionLostError, f"{cause.what}; {account}", account, hint)
         error.__cause__ = cause
         return error
