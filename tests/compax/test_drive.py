@@ -292,7 +292,9 @@ async def test_a_follower_that_is_gone_is_forgotten() -> None:
         for _ in range(10):
             drive.events()
         gc.collect()
-        assert len(drive._events._streams) == 0
+        streams = drive._events._streams
+        assert streams is not None
+        assert len(streams) == 0
 
 
 async def test_an_order_of_somebody_else_shows_as_unexpected_text() -> None:

@@ -338,7 +338,7 @@ async def test_a_frame_that_may_be_cut_lets_nothing_but_stop_go_until_somebody_s
     settings = DriveSettings(
         answer_timeout_s=0.3, binary_settings=True, binary_motion=True, reconnect=False, in_doubt_after_s=1
     )
-    far = drive_named("binary", compax_aio.simulator.compax.Knobs(p20=16))  # type: ignore[attr-defined]
+    far = drive_named("binary", compax_aio.simulator.compax.Knobs(p20=16))
     async with (
         record_trace(path),
         compax_aio.connect("sim://compax?name=binary", name="x", settings=settings) as drive,

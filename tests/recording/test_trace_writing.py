@@ -126,7 +126,7 @@ async def test_what_fails_is_recorded_with_its_reason(path: Path) -> None:
 async def test_time_outs_markers_and_stops_ahead_can_be_told_apart(path: Path) -> None:
     settings = compax_aio.DriveSettings(answer_timeout_s=0.3)
     async with record_trace(path), compax_aio.connect("sim://compax?name=x", name="x", settings=settings) as drive:
-        far = compax_aio.simulator.server.drive_named("x")  # type: ignore[attr-defined]
+        far = compax_aio.simulator.server.drive_named("x")
         far.lose_answers = 1
         with pytest.raises(compax_aio.AnswerTimeoutError):
             await drive.query("S4")
