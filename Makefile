@@ -35,10 +35,12 @@ matrix:  ## all tests on every CPython from 3.11 up that this machine has
 
 bench:  ## what each thing costs, beside its target and what others take, in some minutes
 	@$(MAKE) --no-print-directory VENV=.venv-bench .venv-bench/bench.ready
+	@mkdir -p .bench
 	@.venv-bench/bin/python -m benchmarks --json .bench/short.json
 
 bench-full:  ## the same in longer rounds
 	@$(MAKE) --no-print-directory VENV=.venv-bench .venv-bench/bench.ready
+	@mkdir -p .bench
 	@.venv-bench/bin/python -m benchmarks --full --json .bench/full.json
 
 torture:  ## who gets whose answer after a time-out, here and with other libraries
