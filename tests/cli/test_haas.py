@@ -430,6 +430,18 @@ def test_an_interruption_sends_no_more_and_says_what_went(compax: Compax, on_sta
     assert 0 < mill["far_end"].received_bytes < 2500
 
 
+def test_an_interruption_while_it_is_read_back_says_that_all_has_left(
+    compax: Compax, on_stage: Plan, mill: dict[str, Any]
+) -> None:
+    mill["profile"] = "dc_codes"
+    on_stage(1.0, recv())
+    on_stage(10.0, ctrl_c)
+    code, text = compax("send", URL, "new.nc", *DC_CODES, "--verify")
+    assert code == 130
+    assert "All of it has left; whether the control has stored it, its screen shows." in text
+    assert "waits for the rest" not in text
+
+
 def test_an_interruption_before_anything_went_says_so(compax: Compax, on_stage: Plan) -> None:
     on_stage(3.0, ctrl_c)
     code, text = compax("send", URL, "new.nc", *DC_CODES)

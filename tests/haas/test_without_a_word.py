@@ -118,3 +118,46 @@ async def test_a_file_that_comes_where_the_archive_was_to_be_is_left_as_it_is(tm
     assert received.archive.read_bytes() == received.data
     (warning,) = received.warnings
     assert "meanwhile, and was left as it is: what was received is in" in warning
+
+
+# The second look -----------------------------------------------------------------------------------------------------
+
+
+async def test_of_a_program_that_is_not_sent_back_it_is_not_said_that_it_was_not_read() -> None:
+    async with bench(CLASSIC_DC_CODES) as b:
+        b.far.press_recv()
+        error = await ending(b.control.send_program("O01234\nM30", verify=True, operator_timeout_s=5))
+        text = str(error)
+        assert "did not send the program in time, when it was to send back what it had stored" in text
+        assert "it was sent to its end before; 21 of 21 bytes have left" in text
+        assert "press SEND" in text
+        assert "RECV" not in text
+
+
+async def test_of_a_program_that_does_not_come_twice_it_is_said_that_it_came_once() -> None:
+    async with bench(CLASSIC_DC_CODES) as b:
+        transfer = b.control.receive_program(verify=True, operator_timeout_s=5)
+        await b.press("send", "O00010", after_s=1)
+        assert "came to its end the first time" in str(await ending(transfer))
+
+
+async def test_of_a_line_that_is_lost_at_the_second_look_it_is_said_that_all_was_sent() -> None:
+    async with bench(CLASSIC_DC_CODES) as b:
+        b.far.press_recv()
+        transfer = b.control.send_program("O01234\nM30", verify=True)
+        await until(lambda: transfer.account.bytes == 21)
+        await asyncio.sleep(10)
+        b.lose_line()
+        text = str(await ending(transfer))
+        assert "it was sent to its end before" in text
+        assert "waits for the rest" not in text
+        assert not b.control._line.may_wait_for_rest
+
+
+async def test_of_a_line_that_is_lost_in_the_middle_it_is_said_to_press_reset() -> None:
+    async with bench(CLASSIC_DC_CODES) as b:
+        b.far.press_recv()
+        transfer = b.control.send_program(program_of(3000))
+        await until(lambda: transfer.account.bytes > 500)
+        b.lose_line()
+        assert "press RESET at the control, which waits for the rest" in str(await ending(transfer))

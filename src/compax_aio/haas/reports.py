@@ -99,6 +99,15 @@ def with_account(error: _Error, account: TransferAccount) -> _Error:
     return error
 
 
+def _second_look(account: TransferAccount) -> str:
+    """Say, of a file that is there to be compared, how it stands with the file itself."""
+    if account.phase != "verifying":
+        return ""
+    if account.way == "send":
+        return ", when it was to send back what it had stored; it was sent to its end before"
+    return ", when it was to come a second time; it came to its end the first time"
+
+
 class TransferReports:
     """
     Writes the errors of one control's transfers.
@@ -134,21 +143,22 @@ class TransferReports:
     def of_ending(self, ending: Ending, account: TransferAccount, detail: str = "") -> CompaxError:
         """Report a transfer that did not end well, by how it ended."""
         kind_of_error, what, hint = _STORIES[ending]
-        sends = account.way == "send"
+        sends = account.way == "send" and account.phase != "verifying"
         words = {
             "kind": account.kind,
             "did_not": "was not ready to read" if sends else "did not send",
             "operator": operator_text(account.kind, sends=sends),
             "profile": self._profile.name,
         }
-        more = f" ({detail})" if detail else ""
-        return self._of(kind_of_error, f"{what.format_map(words)}{more}; {account}", account, hint.format_map(words))
+        what = what.format_map(words) + (f" ({detail})" if detail else "") + _second_look(account)
+        return self._of(kind_of_error, f"{what}; {account}", account, hint.format_map(words))
 
     def lost(self, account: TransferAccount, cause: CompaxError) -> ConnectionLostError:
         """Report a transfer whose line was lost, or closed."""
-        reset = "press RESET at the control, which waits for the rest, and " if account.way == "send" else ""
+        waits = account.way == "send" and account.phase != "verifying"
+        reset = "press RESET at the control, which waits for the rest, and " if waits else ""
         hint = f"a transfer is never resumed: {reset}begin anew when the line is back; {_SCREEN}"
-        error = self._of(ConnectionLostError, f"{cause.what}; {account}", account, hint)
+        error = self._of(ConnectionLostError, f"{cause.what}{_second_look(account)}; {account}", account, hint)
         error.__cause__ = cause
         return error
 

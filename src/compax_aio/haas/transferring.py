@@ -287,6 +287,7 @@ class Transferring(ABC, Generic[_ResultT]):
         try:
             account = await self._line.transfer(strategy)
         except ConnectionLostError as error:
+            self._ask_nothing()  # so that the phase is that of the file
             raise self._reports.lost(self.account(), error) from error
         finally:
             self._ask_nothing()

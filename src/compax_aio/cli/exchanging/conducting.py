@@ -98,6 +98,8 @@ def _what_now(account: TransferAccount) -> str:
         return "The machine runs what it has got, then stands: look at it, press RESET, and begin anew."
     if not account.bytes:
         return "The control, if it waits, waits on: press RESET there."
+    if account.bytes == account.total_bytes:
+        return "All of it has left; whether the control has stored it, its screen shows."
     return "The control waits for the rest: press RESET there. It may have stored what it has got."
 
 
