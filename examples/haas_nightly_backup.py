@@ -70,12 +70,17 @@ async def back_up_one(control: haas.Control, kind: str, night: Night, report: Re
         received = await getattr(control, f"receive_{kind}")(
             archive=night.today / control.name / f"{kind}.txt", verify=True, on_operator=tell
         )
-    except (compax_aio.AnswerTimeoutError, compax_aio.UnexpectedAnswerError) as error:
+    except compax_aio.TransportError:
+        raise  # without its line nothing else of this control can be had
+    except compax_aio.CompaxError as error:
         report.missing.append(f"{kind}: {error.what}")
         return
     report.kept.append(f"{kind}: {len(received.data)} bytes, {received.verified.equal}")
     if before is not None:
-        found = await asyncio.to_thread(differences, kind, before, received.file)
+        try:
+            found = await asyncio.to_thread(differences, kind, before, received.file)
+        except (compax_aio.CompaxError, OSError) as error:
+            found = [f"cannot be compared with {before}: {error}"]
         report.changed += [f"{kind}: {each}" for each in found[:MOST_TOLD]]
         if len(found) > MOST_TOLD:
             report.changed.append(f"{kind}: and {len(found) - MOST_TOLD} more")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 from collections.abc import Coroutine, Iterator
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import pytest
 from tests.examples.test_examples import load
 
+from compax_aio.haas.archive import Archive
 from compax_aio.simulator.clock import VirtualClockLoop
 from compax_aio.simulator.haas import Knobs, SimulatedControl
 from compax_aio.simulator.server import control_named
@@ -116,3 +118,33 @@ def test_what_names_no_control_is_refused(
     assert shop.night(*words) == 1
     assert "is no NAME=URL" in capsys.readouterr().err
     assert not shop.folder.exists()
+
+
+def test_a_file_that_cannot_be_kept_harms_no_other_one(
+    shop: Shop, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    append = Archive._append
+
+    def no_room(self: Archive, data: bytes) -> None:
+        if "settings" in str(self.place):
+            raise OSError(errno.ENOSPC, "No space left on device")
+        append(self, data)
+
+    monkeypatch.setattr(Archive, "_append", no_room)
+    shop.control("full")
+    assert shop.night(f"full={URL}full") == shop.example.MISSING
+    captured = capsys.readouterr()
+    assert "full: 4 of 5 files kept" in captured.out
+    assert "missing: settings: the settings came, but could not be written to the archive" in captured.err
+
+
+def test_what_cannot_be_compared_is_kept_and_told_as_changed(shop: Shop, capsys: pytest.CaptureFixture[str]) -> None:
+    shop.control("older")
+    assert shop.night(f"older={URL}older") == 0
+    (file,) = shop.folder.glob("*/older/offsets.txt")
+    file.write_text("this is no file of a control\n")
+    shop.control("older2")
+    capsys.readouterr()
+    assert shop.night(f"older={URL}older2") == shop.example.CHANGED
+    assert "5 of 5 files kept" in (text := capsys.readouterr().out)
+    assert "changed  offsets: cannot be compared with" in text

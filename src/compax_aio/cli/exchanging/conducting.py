@@ -93,14 +93,18 @@ def _what_now(account: TransferAccount) -> str:
             return "No file was written."
         return "" if account.archive is None else f"What came is in {account.archive}."
     if account.kind == "drip feed":
-        if not account.bytes:
-            return "The machine has got nothing to run."
-        return "The machine runs what it has got, then stands: look at it, press RESET, and begin anew."
+        return _what_the_machine_does(account)
     if not account.bytes:
         return "The control, if it waits, waits on: press RESET there."
     if account.bytes == account.total_bytes:
         return "All of it has left; whether the control has stored it, its screen shows."
     return "The control waits for the rest: press RESET there. It may have stored what it has got."
+
+
+def _what_the_machine_does(account: TransferAccount) -> str:
+    if not account.bytes:
+        return "The machine has got nothing to run."
+    return "The machine runs what it has got, then stands: look at it, press RESET, and begin anew."
 
 
 def _tell_people(error: CompaxError) -> None:
