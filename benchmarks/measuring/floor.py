@@ -39,7 +39,8 @@ class Bare(asyncio.Protocol):
         """Look for the prompt."""
         self._come += data
         if PROMPT in data and self._answer is not None:
-            self._answer.set_result(self._come)
+            if not self._answer.done():  # whoever asked may have been cancelled
+                self._answer.set_result(self._come)
             self._answer, self._come = None, b""
 
 
