@@ -1,7 +1,9 @@
 """
 Every asynchronous test runs on a virtual clock, unless it is marked ``real_time``.
 
-Property tests draw the same examples every time; ``HYPOTHESIS_PROFILE=explore`` draws new ones.
+Property tests draw the same examples every time; ``HYPOTHESIS_PROFILE=explore`` draws new ones. The command runs on the
+event loop of Python, as most tests let that one's clock be virtual; ``COMPAX_LOOP=uvloop`` tries what runs in real time
+on uvloop, if it is installed.
 """
 
 from __future__ import annotations
@@ -19,6 +21,8 @@ from compax_aio.simulator.clock import VirtualClockLoop
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.register_profile("explore", max_examples=2000, deadline=None)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "repeatable"))
+
+os.environ.setdefault("COMPAX_LOOP", "asyncio")  # for programs that tests start, too
 
 
 def pytest_configure() -> None:
