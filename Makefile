@@ -55,7 +55,7 @@ cutting: $(VENV)/test.ready  ## how much of the wire a cutting job of megabytes 
 	@$(BIN)/python -m benchmarks.cutting
 
 files: $(VENV)/test.ready  ## programs of two megabytes to and from a simulated control, by each synchronisation
-	@HAAS_LARGE=1 $(BIN)/python -m pytest -q --durations=8 tests/haas/test_whole_and_exact.py -k two_megabytes
+	@$(BIN)/python -m pytest -q --durations=8 tests/haas/test_whole_and_exact.py -k two_megabytes
 
 hunt: $(VENV)/test.ready  ## whole applications in trouble, seed after seed, for HUNT_MINUTES (30); HUNT_DEVICE=smc
 	@$(BIN)/python -m compax_aio.simulator.hunt --device $(or $(HUNT_DEVICE),compax) --minutes $(or $(HUNT_MINUTES),30)

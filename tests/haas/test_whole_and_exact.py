@@ -3,14 +3,12 @@ Files go whole and byte for byte by each synchronisation, both ways, whatever be
 
 The far end's own memory, and the bytes that it says to have sent, are what results are compared with. What delays or
 parts bytes, or holds the line, changes nothing. What damages them is repaired (XMODEM), found at its place (a parity
-bit in the bytes), or found by looking twice (``verify=True``). Two megabytes go both ways by each of them where the
-environment variable ``HAAS_LARGE`` is set; else where that takes a few seconds, and parts of it by the others.
+bit in the bytes), or found by looking twice (``verify=True``). Two megabytes go both ways by each of them.
 """
 
 from __future__ import annotations
 
 import asyncio
-import os
 from collections.abc import Callable
 from contextlib import AbstractAsyncContextManager
 from dataclasses import replace
@@ -29,13 +27,6 @@ from compax_aio.simulator.faulty_cable import FaultyCable, Noise
 SEEDS: Final = range(12)
 WAYS: Final = ("receive", "send")
 LARGE_BYTES: Final = 2 * 1024 * 1024
-USUAL_BYTES: Final = {
-    ("receive", False): LARGE_BYTES,
-    ("receive", True): LARGE_BYTES // 8,
-    ("send", False): LARGE_BYTES // 16,
-    ("send", True): LARGE_BYTES // 8,
-}
-"""By way, and whether it is XMODEM: what takes a few seconds."""
 NUMBER: Final = "O01234"
 
 
@@ -203,8 +194,7 @@ async def test_whatever_becomes_of_it_the_next_one_is_whole(mode: str, seed: int
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("mode", MODES)
 async def test_two_megabytes_go_whole_and_exact(mode: str, way: str) -> None:
-    size = LARGE_BYTES if os.environ.get("HAAS_LARGE") else USUAL_BYTES[way, mode == "xmodem"]
-    text = program_of(size)
+    text = program_of(LARGE_BYTES)
     cable = _cable()
     profile = replace(MODES[mode], baudrate=115200)
     async with _bench(profile, cable, baudrate=115200) as b:
